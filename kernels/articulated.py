@@ -1,0 +1,237 @@
+"""The articulated-body factorisation: Mh = L^T D L in O(n), and velocities seen through it.
+
+Mh = M + armature + h Kd + h^2 Kp is never formed. Going from the leaves to the root, each dof j takes
+out of its link's articulated inertia I what it lets move freely (RBDA 7.3):
+
+    U = I s,   D = s . U + load,   I <- I - U U^T / D.
+
+U / D along the path to the root is row j of L: completing the square for every dof gives
+
+    qd^T Mh qd = sum_j D_j (qd_j + U_j . V_j / D_j)^2,
+
+V_j being the velocity of the link that the dofs before j alone would give. So `w = D^(1/2) L qd` is
+velocity in coordinates where the mass matrix is the identity, and a force F on a link changes w by
+D_j^(-1/2) s_j . F at each dof j, after which F - U_j / D_j (s_j . F) goes on towards the root. Contacts
+are solved in these coordinates (see `contact`). `world.U` holds U D^(-1/2) and `world.d` D^(-1/2).
+"""
+
+import warp as wp
+
+from .drive import Push, pd, spring, stop
+from .kinematics import drift, load3, load4, store3
+from .lanes import Real, add, any_lt, div, fill, most, mul, neg, root, size, sub, where_lt
+from .spatial import (
+    Force,
+    Inertia,
+    Motion,
+    Quat,
+    Vec3,
+    add,
+    column,
+    conjugate,
+    dot,
+    downdate,
+    frame,
+    logarithm,
+    mul,
+    mul_t,
+    neg,
+    norm,
+    rotate,
+    row,
+    shift_force,
+    shift_inertia,
+    shift_motion,
+    slide,
+    sub,
+    turn,
+    unit3,
+    where_lt,
+)
+from .tree import BALL, FREE, GROUND, HINGE, Tree, World
+
+
+@wp.struct
+class Body:
+    """What is left of a link while its dofs are taken out, last first."""
+
+    I: Inertia  # noqa: E741
+    p: Force
+    V: Motion
+    """velocity that the dofs still to come give"""
+
+
+@wp.func
+def take_out(
+    world: World, g: int, j: int, b: Body, U: Force, D: Real, force: Real, v: Real, V: Motion, h: float
+) -> Body:
+    """Take dof j out of a body: U = I s, D its diagonal, `force` the net force along it, v its velocity,
+    V what the dofs before it give."""
+    d = 1.0 / root(D)
+    U = d * U
+    e = d * force
+    world.U[g, j] = U
+    world.d[g, j] = d
+    world.w[g, j] = v / d + dot(V, U) + h * e
+    return Body(downdate(b.I, U), b.p + e * U, V)
+
+
+@wp.func
+def take_out_turn(
+    world: World, g: int, j: int, b: Body, s: Vec3, v: Real, force: Real, load: Real, h: float
+) -> Body:
+    """Take out a rotation about s, driven with `force`, with `load` on its diagonal."""
+    U = turn(b.I, s)
+    V = Motion(b.V.w - v * s, b.V.v)
+    world.s[g, j] = s
+    net = force + world.joint_f[g, j] - dot(s, b.p.n)
+    return take_out(world, g, j, b, U, dot(s, U.n) + load, net, v, V, h)
+
+
+@wp.func
+def take_out_shift(
+    world: World, g: int, j: int, b: Body, s: Vec3, v: Real, force: Real, load: Real, h: float
+) -> Body:
+    """Take out a translation along s."""
+    U = slide(b.I, s)
+    V = Motion(b.V.w, b.V.v - v * s)
+    world.s[g, j] = s
+    net = force + world.joint_f[g, j] - dot(s, b.p.f)
+    return take_out(world, g, j, b, U, dot(s, U.f) + load, net, v, V, h)
+
+
+@wp.func
+def free_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
+    h = tree.h
+    j = tree.link_dof[i]
+    iq = tree.link_q[i]
+    R = world.R[g, i]
+    v = load3(world.qd, g, j)
+    w = load3(world.qd, g, j + 3)
+    effort = tree.link_effort[i]
+    away = logarithm(conjugate(load4(world.q, g, iq + 3)) * load4(world.target, g, iq + 3))
+    spin = pd(tree, j + 3, away, w, effort)
+    push = pd(tree, j, load3(world.target, g, iq) - load3(world.q, g, iq), v, effort)
+    b = take_out_turn(world, g, j + 5, b, column(R, 2), w.z, spin.force.z, spin.load, h)
+    b = take_out_turn(world, g, j + 4, b, column(R, 1), w.y, spin.force.y, spin.load, h)
+    b = take_out_turn(world, g, j + 3, b, column(R, 0), w.x, spin.force.x, spin.load, h)
+    b = take_out_shift(world, g, j + 2, b, unit3(2), v.z, push.force.z, push.load, h)
+    b = take_out_shift(world, g, j + 1, b, unit3(1), v.y, push.force.y, push.load, h)
+    b = take_out_shift(world, g, j, b, unit3(0), v.x, push.force.x, push.load, h)
+    return b
+
+
+@wp.func
+def sprung(tree: Tree, iq: int) -> Quat:
+    """Rest orientation of a ball joint's passive spring."""
+    q = tree.q_spring
+    return Quat(fill(q[iq]), fill(q[iq + 1]), fill(q[iq + 2]), fill(q[iq + 3]))
+
+
+@wp.func
+def ball_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
+    h = tree.h
+    j = tree.link_dof[i]
+    iq = tree.link_q[i]
+    q = load4(world.q, g, iq)
+    R = world.R[g, i]
+    v = load3(world.qd, g, j)
+    drive = pd(tree, j, logarithm(conjugate(q) * load4(world.target, g, iq)), v, tree.link_effort[i])
+    if tree.link_sprung[i] != 0:
+        drive = spring(tree, j, drive, logarithm(conjugate(q) * sprung(tree, iq)), v)
+    # Any three orthogonal axes will do for a ball joint's motion: the link's own, or, at the limit,
+    # the axis it has turned about and two more.
+    sx = column(R, 0)
+    sy = column(R, 1)
+    sz = column(R, 2)
+    halt = Push(fill(0.0), fill(0.0))
+    if tree.link_limited[i] != 0:
+        if any_lt(size(q.w), fill(tree.link_near[i])):
+            turned = logarithm(q)
+            angle = norm(turned)
+            axes = frame((1.0 / most(angle, fill(1.0e-6))) * turned)
+            n = row(axes, 0)
+            s = R * n
+            halt = stop(tree, tree.link_upper[i] - angle, dot(n, v), dot(s, b.I.A * s) + drive.load)
+            zero = fill(0.0)
+            sx = where_lt(zero, halt.load, s, sx)
+            sy = where_lt(zero, halt.load, R * row(axes, 1), sy)
+            sz = where_lt(zero, halt.load, R * row(axes, 2), sz)
+    w = R * v
+    f = R * drive.force
+    k = drive.load
+    b = take_out_turn(world, g, j + 2, b, sz, dot(sz, w), dot(sz, f), k, h)
+    b = take_out_turn(world, g, j + 1, b, sy, dot(sy, w), dot(sy, f), k, h)
+    b = take_out_turn(world, g, j, b, sx, dot(sx, w), dot(sx, f) + halt.force, k + halt.load, h)
+    return b
+
+
+@wp.func
+def hinge_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
+    j = tree.link_dof[i]
+    iq = tree.link_q[i]
+    q = world.q[g, iq]
+    v = world.qd[g, j]
+    s = rotate(world.R[g, i], tree.link_axis[i])
+    drive = pd(tree, j, world.target[g, iq] - q, v, tree.link_effort[i])
+    if tree.link_sprung[i] != 0:
+        drive = spring(tree, j, drive, tree.q_spring[iq] - q, v)
+    if tree.link_limited[i] != 0:
+        weight = dot(s, b.I.A * s) + drive.load
+        upper = stop(tree, tree.link_upper[i] - q, v, weight)
+        lower = stop(tree, q - tree.link_lower[i], neg(v), weight)
+        drive = Push(
+            drive.force + upper.force - lower.force, drive.load + upper.load + lower.load
+        )
+    return take_out_turn(world, g, j, b, s, v, drive.force, drive.load, tree.h)
+
+
+@wp.func
+def factorize(tree: Tree, world: World, g: int):
+    """Leaves to root: drives, the factor (s, U, d) and w, the velocity that the step's smooth forces
+    lead to. Consumes I and p."""
+    for k in range(tree.link_count):
+        i = tree.link_count - k
+        joint = tree.link_joint[i]
+        I = world.I[g, i]  # noqa: E741
+        parent = tree.link_parent[i]
+        b = Body(I, world.p[g, i] + I * drift(world, g, i, parent), world.V[g, i])
+        if joint == HINGE:
+            b = hinge_joint(tree, world, g, i, b)
+        elif joint == BALL:
+            b = ball_joint(tree, world, g, i, b)
+        else:
+            b = free_joint(tree, world, g, i, b)
+        if parent != GROUND:
+            r = world.r[g, i]
+            world.I[g, parent] = world.I[g, parent] + shift_inertia(b.I, r)
+            world.p[g, parent] = world.p[g, parent] + shift_force(b.p, r)
+
+
+@wp.func
+def velocities(tree: Tree, world: World, g: int):
+    """Root to leaves: qd = L^-1 D^(-1/2) w, and V."""
+    for i in range(1, tree.link_count + 1):
+        joint = tree.link_joint[i]
+        j = tree.link_dof[i]
+        V = shift_motion(world.V[g, tree.link_parent[i]], world.r[g, i])
+        if joint == HINGE:
+            v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+            world.qd[g, j] = v
+            V.w = V.w + v * world.s[g, j]
+        else:
+            before = V.w
+            if joint == FREE:
+                vx = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+                V.v.x = V.v.x + vx
+                vy = world.d[g, j + 1] * (world.w[g, j + 1] - dot(V, world.U[g, j + 1]))
+                V.v.y = V.v.y + vy
+                vz = world.d[g, j + 2] * (world.w[g, j + 2] - dot(V, world.U[g, j + 2]))
+                V.v.z = V.v.z + vz
+                store3(world.qd, g, j, Vec3(vx, vy, vz))
+                j = j + 3
+            for k in range(3):
+                v = world.d[g, j + k] * (world.w[g, j + k] - dot(V, world.U[g, j + k]))
+                V.w = V.w + v * world.s[g, j + k]
+            store3(world.qd, g, j, mul_t(world.R[g, i], V.w - before))
+        world.V[g, i] = V

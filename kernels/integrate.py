@@ -1,0 +1,33 @@
+"""Semi-implicit Euler on the group: q+ = q + h v+, rotations by the quaternion exponential."""
+
+import warp as wp
+
+from .kinematics import load3, load4, store3
+from .lanes import Real, add, fill, mul
+from .spatial import Quat, Vec3, add, exponential, mul, normalize
+from .tree import BALL, FREE, Tree, World
+
+
+@wp.func
+def turn_joint(world: World, g: int, iq: int, v: Vec3, h: Real):
+    q = normalize(load4(world.q, g, iq) * exponential(h * v))
+    world.q[g, iq] = q.x
+    world.q[g, iq + 1] = q.y
+    world.q[g, iq + 2] = q.z
+    world.q[g, iq + 3] = q.w
+
+
+@wp.func
+def integrate(tree: Tree, world: World, g: int):
+    h = fill(tree.h)
+    for i in range(1, tree.link_count + 1):
+        joint = tree.link_joint[i]
+        iq = tree.link_q[i]
+        iv = tree.link_dof[i]
+        if joint == FREE:
+            store3(world.q, g, iq, load3(world.q, g, iq) + h * load3(world.qd, g, iv))
+            turn_joint(world, g, iq + 3, load3(world.qd, g, iv + 3), h)
+        elif joint == BALL:
+            turn_joint(world, g, iq, load3(world.qd, g, iv), h)
+        else:
+            world.q[g, iq] = world.q[g, iq] + h * world.qd[g, iv]

@@ -1,0 +1,116 @@
+"""Poses and velocities of all links, their inertias and velocity-product forces (RBDA chapters 2-4)."""
+
+import warp as wp
+
+from .lanes import Real, add, fill, mul, neg, sub
+from .spatial import (
+    Force,
+    Motion,
+    Quat,
+    Sym3,
+    Vec3,
+    about,
+    add,
+    cross,
+    mul,
+    mul_t,
+    neg,
+    quat,
+    rigid,
+    rotate,
+    rotation,
+    sub,
+    vec3,
+    zero3,
+)
+from .tree import BALL, FREE, HINGE, Tree, World
+
+
+@wp.func
+def load3(a: wp.array2d(dtype=Real), g: int, i: int) -> Vec3:
+    return Vec3(a[g, i], a[g, i + 1], a[g, i + 2])
+
+
+@wp.func
+def load4(a: wp.array2d(dtype=Real), g: int, i: int) -> Quat:
+    return Quat(a[g, i], a[g, i + 1], a[g, i + 2], a[g, i + 3])
+
+
+@wp.func
+def store3(a: wp.array2d(dtype=Real), g: int, i: int, v: Vec3):
+    a[g, i] = v.x
+    a[g, i + 1] = v.y
+    a[g, i + 2] = v.z
+
+
+@wp.func
+def kinematics(tree: Tree, world: World, g: int):
+    """turn, R, pos, r and V of every link from joint_q and joint_qd."""
+    for i in range(1, tree.link_count + 1):
+        parent = tree.link_parent[i]
+        joint = tree.link_joint[i]
+        iq = tree.link_q[i]
+        iv = tree.link_dof[i]
+        V = world.V[g, parent]
+        if joint == FREE:
+            turn = load4(world.q, g, iq + 3)
+            R = rotation(turn)
+            world.turn[g, i] = turn
+            world.R[g, i] = R
+            world.pos[g, i] = load3(world.q, g, iq)
+            world.r[g, i] = zero3()
+            world.V[g, i] = Motion(R * load3(world.qd, g, iv + 3), load3(world.qd, g, iv))
+        else:
+            r = rotate(world.R[g, parent], tree.link_offset[i])
+            turn = world.turn[g, parent] * quat(tree.link_turn[i])
+            if joint == BALL:
+                turn = turn * load4(world.q, g, iq)
+            else:
+                turn = turn * about(tree.link_axis[i], world.q[g, iq] - tree.link_zero[i])
+            R = rotation(turn)
+            spin = zero3()
+            if joint == BALL:
+                spin = R * load3(world.qd, g, iv)
+            else:
+                spin = world.qd[g, iv] * rotate(R, tree.link_axis[i])
+            world.turn[g, i] = turn
+            world.R[g, i] = R
+            world.pos[g, i] = world.pos[g, parent] + r
+            world.r[g, i] = r
+            world.V[g, i] = Motion(V.w + spin, V.v + cross(V.w, r))
+
+
+@wp.func
+def drift(world: World, g: int, i: int, parent: int) -> Motion:
+    """Acceleration of a link whose joint and parent do not accelerate: what its joint's velocity gains
+    from the parent's turning, and the parent's centripetal acceleration."""
+    w = world.V[g, parent].w
+    return Motion(cross(w, world.V[g, i].w), cross(w, cross(w, world.r[g, i])))
+
+
+@wp.func
+def inertias(tree: Tree, world: World, g: int):
+    """Each link's own inertia I and the force p that holds it on its present course:
+    p = V x* I V - gravity [2.72], about the link's origin."""
+    gravity = vec3(tree.gravity)
+    for i in range(1, tree.link_count + 1):
+        R = world.R[g, i]
+        k = world.mass_scale[g, i]
+        J = tree.link_moments[i]
+        P = tree.link_products[i]
+        mass = k * tree.link_mass[i]
+        com = rotate(R, tree.link_com[i])
+        I = rigid(  # noqa: E741
+            R, mass, com, Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2])
+        )
+        w = world.V[g, i].w
+        f = mass * (cross(w, cross(w, com)) - gravity)
+        n = cross(w, I.A * w) - mass * cross(com, gravity)
+        world.I[g, i] = I
+        world.p[g, i] = Force(n, f)
+    if tree.forced != 0:
+        for b in range(tree.body_link.shape[0]):
+            i = tree.body_link[b]
+            f = world.force[g, b]
+            p = world.p[g, i]
+            world.p[g, i] = Force(p.n - cross(rotate(world.R[g, i], tree.body_com[b]), f), p.f - f)

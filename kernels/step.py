@@ -1,0 +1,87 @@
+"""One step of the simulation, and the kernels that launch it or a part of it.
+
+`program(lanes)` gives this module for a number of lanes; a launch covers `dim` groups from `first` on.
+"""
+
+import warp as wp
+
+from .articulated import factorize, velocities
+from .contact import find, solve
+from .integrate import integrate
+from .kinematics import inertias, kinematics
+from .lanes import LANES, Real
+from .tree import Tree, World  # noqa: F401 (also read by sims)
+
+wp.set_module_options(
+    {
+        "enable_backward": False,
+        "max_unroll": 3,
+        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512"
+        " -mllvm=-inline-threshold=9000",
+    }
+)
+
+
+def load(device) -> None:
+    """Compile the kernels now; to be done before threads launch them."""
+    wp.load_module(__name__, device=device)
+
+
+@wp.func
+def advance(tree: Tree, world: World, g: int):
+    kinematics(tree, world, g)
+    inertias(tree, world, g)
+    factorize(tree, world, g)
+    find(tree, world, g)
+    solve(tree, world, g)
+    velocities(tree, world, g)
+    integrate(tree, world, g)
+
+
+@wp.kernel
+def step(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        advance(tree, world, g)
+
+
+@wp.kernel
+def run_kinematics(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        kinematics(tree, world, g)
+
+
+@wp.kernel
+def run_inertias(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        inertias(tree, world, g)
+
+
+@wp.kernel
+def run_factorize(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        factorize(tree, world, g)
+
+
+@wp.kernel
+def run_velocities(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        velocities(tree, world, g)
+
+
+@wp.kernel
+def run_find(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        find(tree, world, g)
+
+
+@wp.kernel
+def run_solve(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        solve(tree, world, g)

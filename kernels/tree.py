@@ -1,0 +1,171 @@
+"""What the kernels read and write: `Tree`, the model, the same for all worlds, and `World`, the rest.
+
+A tree has links 1 .. n, parents before children; link 0 is the ground. Every link has one joint, so a
+body with several joints becomes a chain of links of which the last carries the mass, and a body with
+none belongs to its parent's link. A link's origin is its joint's anchor.
+
+Arrays of a `World` are `(groups, n)`, one group being the worlds of one `Real`: a group's row is
+contiguous on a CPU, and on CUDA, where a group is one world, neighbouring worlds lie side by side.
+"""
+
+import warp as wp
+
+from .lanes import Real
+from .spatial import Force, Inertia, Mat3, Motion, Quat, Vec3
+
+FREE = wp.constant(0)
+BALL = wp.constant(1)
+HINGE = wp.constant(2)
+
+GROUND = wp.constant(0)
+
+# kinds of contact slots
+POINT_PLANE = wp.constant(0)
+SPHERE_CAPSULE = wp.constant(1)
+SPHERE_BOX = wp.constant(2)
+CAPSULE_CAPSULE = wp.constant(3)
+
+
+@wp.struct
+class Tree:
+    h: float
+    """time step [s]"""
+    gravity: wp.vec3
+    link_count: int
+    """links, the ground not counted"""
+    q_count: int
+    dof_count: int
+    slot_count: int
+    response_room: int
+    """responses that `World.y` holds; what does not fit is worked out anew in each sweep"""
+    sweeps: int
+    """sweeps of the contact solver"""
+    forced: int
+    """1 while any external or joint force is set"""
+
+    link_parent: wp.array(dtype=int)
+    link_joint: wp.array(dtype=int)
+    link_q: wp.array(dtype=int)
+    link_dof: wp.array(dtype=int)
+    link_offset: wp.array(dtype=wp.vec3)
+    """origin in the parent's axes [m]"""
+    link_turn: wp.array(dtype=wp.quat)
+    """axes at joint_q = 0 in the parent's"""
+    link_axis: wp.array(dtype=wp.vec3)
+    """hinge axis in the link's axes"""
+    link_zero: wp.array(dtype=float)
+    """hinge angle that counts as none [rad]"""
+    link_mass: wp.array(dtype=float)
+    link_com: wp.array(dtype=wp.vec3)
+    link_moments: wp.array(dtype=wp.vec3)
+    """xx, yy, zz about the origin, link axes [kg m^2]"""
+    link_products: wp.array(dtype=wp.vec3)
+    """xy, xz, yz"""
+    link_effort: wp.array(dtype=float)
+    """largest drive torque [N m]; infinite where there is no limit"""
+    link_limited: wp.array(dtype=int)
+    link_lower: wp.array(dtype=float)
+    link_upper: wp.array(dtype=float)
+    """hinge: angles [rad]; ball: largest angle from its zero"""
+    link_near: wp.array(dtype=float)
+    """ball: cosine of half the angle at which its limit is first looked at"""
+    link_sprung: wp.array(dtype=int)
+
+    dof_armature: wp.array(dtype=float)
+    dof_damping: wp.array(dtype=float)
+    dof_stiffness: wp.array(dtype=float)
+    dof_kp: wp.array(dtype=float)
+    dof_kd: wp.array(dtype=float)
+    q_spring: wp.array(dtype=float)
+    """rest position of passive springs, laid out as joint_q"""
+
+    body_link: wp.array(dtype=int)
+    body_offset: wp.array(dtype=wp.vec3)
+    """body frame in its link"""
+    body_turn: wp.array(dtype=wp.quat)
+    body_com: wp.array(dtype=wp.vec3)
+    """centre of mass in its link [m]"""
+
+    shape_link: wp.array(dtype=int)
+    shape_pos: wp.array(dtype=wp.vec3)
+    """centre in its link [m]"""
+    shape_turn: wp.array(dtype=wp.quat)
+    shape_half: wp.array(dtype=wp.vec3)
+    """box: half sizes; capsule: half its segment as a vector of the link [m]"""
+    shape_radius: wp.array(dtype=float)
+
+    slot_kind: wp.array(dtype=int)
+    slot_pair: wp.array(dtype=int)
+    slot_a: wp.array(dtype=int)
+    """shape pushed against the normal; a plane's slots: -1"""
+    slot_b: wp.array(dtype=int)
+    slot_link_a: wp.array(dtype=int)
+    slot_link_b: wp.array(dtype=int)
+    slot_meet: wp.array(dtype=int)
+    """nearest common ancestor of the two links"""
+    slot_plane: wp.array(dtype=wp.vec4)
+    """unit normal and offset n . x of the plane"""
+    slot_point: wp.array(dtype=wp.vec3)
+    """plane: the point of the link that may touch [m]"""
+    slot_radius: wp.array(dtype=float)
+    """plane: radius about that point [m]"""
+    slot_flag: wp.array(dtype=int)
+    """0 none, 1 a touch here is a fall, 2 a bad contact"""
+    slot_length: wp.array(dtype=int)
+    """dofs that answer to the slot"""
+    slot_dof: wp.array(dtype=int)
+    """the first of them in response_dof"""
+    response_dof: wp.array(dtype=int)
+    link_flight: wp.array(dtype=int)
+    """the slot in which a free ball meets the ground, its flight solved exactly; else -1"""
+    pair_erp: wp.array(dtype=float)
+    pair_cfm: wp.array(dtype=float)
+
+
+@wp.struct
+class World:
+    q: wp.array2d(dtype=Real)
+    qd: wp.array2d(dtype=Real)
+    target: wp.array2d(dtype=Real)
+    joint_f: wp.array2d(dtype=Real)
+    """generalised force [N, N m]"""
+    force: wp.array2d(dtype=Vec3)
+    """external force at each body's centre of mass [N]"""
+    mass_scale: wp.array2d(dtype=Real)
+    """of each link's inertia"""
+    friction: wp.array2d(dtype=Real)
+    restitution: wp.array2d(dtype=Real)
+
+    turn: wp.array2d(dtype=Quat)
+    R: wp.array2d(dtype=Mat3)
+    pos: wp.array2d(dtype=Vec3)
+    r: wp.array2d(dtype=Vec3)
+    V: wp.array2d(dtype=Motion)
+    I: wp.array2d(dtype=Inertia)
+    p: wp.array2d(dtype=Force)
+
+    s: wp.array2d(dtype=Vec3)
+    U: wp.array2d(dtype=Force)
+    d: wp.array2d(dtype=Real)
+    """D^(-1/2)"""
+    w: wp.array2d(dtype=Real)
+    """whitened velocity, D^(1/2) L qd"""
+
+    gap: wp.array2d(dtype=Real)
+    """[m], negative: overlap"""
+    point: wp.array2d(dtype=Vec3)
+    normal: wp.array2d(dtype=Vec3)
+    goal: wp.array2d(dtype=Real)
+    """least normal velocity that a slot may be left with [m/s]"""
+    impulse: wp.array2d(dtype=Vec3)
+    """along the normal and two tangents [N s]"""
+    y: wp.array2d(dtype=Vec3)
+    """responses of the slots in use: two entries for the slot's own matrix, then one per dof"""
+    active: wp.array2d(dtype=int)
+    """slots in use by some lane of the group, each followed by its place in y; their number is last"""
+    touched: wp.array2d(dtype=Real)
+    """for each link with a flight, the least distance to anything but the ground [m]"""
+
+    broken: wp.array2d(dtype=Real)
+    fallen: wp.array2d(dtype=Real)
+    fumbled: wp.array2d(dtype=Real)

@@ -1,0 +1,1 @@
+"""Learning to dribble: one file per method, each readable beside its paper."""

@@ -1,0 +1,275 @@
+"""Reads an MJCF file, with MuJoCo's own compiler, into the tables that the kernels step.
+
+Any tree of free, ball and hinge joints with capsules, boxes, spheres and planes loads. Position
+actuators become stable PD drives, joint damping and stiffness passive ones. What cannot be simulated
+is refused by name rather than left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+FREE, BALL, HINGE = 0, 1, 2
+KINDS = {0: "plane", 2: "sphere", 3: "capsule", 6: "box"}
+ANYWHERE = 1.0e9
+"""Effort limit [N m] of a joint that has none."""
+
+
+class ModelError(ValueError):
+    """A model file that cannot be read or simulated; the message says which part and what to do."""
+
+
+@dataclass
+class Shape:
+    """A collision shape, as MuJoCo's geom: sizes are half sizes."""
+
+    name: str
+    body: int
+    """index into `Model.body_names`; -1 for the world"""
+    kind: str
+    """"sphere", "capsule", "box" or "plane\""""
+    size: np.ndarray
+    """sphere (r), capsule (r, half length along local z), box (hx, hy, hz) [m]"""
+    pos: np.ndarray
+    """(3,) in the body's frame [m]"""
+    quat: np.ndarray
+    """(4,) xyzw"""
+    rgba: np.ndarray
+    friction: float
+    restitution: float
+    erp: float
+    cfm: float
+    condim: int
+    contype: int
+    conaffinity: int
+
+
+@dataclass
+class Tables:
+    """Links (row 0 is the ground), dofs and bodies as arrays; see `kernels.tree.Tree` for each."""
+
+    link_parent: list = field(default_factory=lambda: [0])
+    link_joint: list = field(default_factory=lambda: [FREE])
+    link_q: list = field(default_factory=lambda: [0])
+    link_dof: list = field(default_factory=lambda: [0])
+    link_offset: list = field(default_factory=lambda: [np.zeros(3)])
+    link_turn: list = field(default_factory=lambda: [np.array([0, 0, 0, 1.0])])
+    link_axis: list = field(default_factory=lambda: [np.array([0, 0, 1.0])])
+    link_zero: list = field(default_factory=lambda: [0.0])
+    link_effort: list = field(default_factory=lambda: [ANYWHERE])
+    link_limited: list = field(default_factory=lambda: [0])
+    link_lower: list = field(default_factory=lambda: [0.0])
+    link_upper: list = field(default_factory=lambda: [0.0])
+    link_near: list = field(default_factory=lambda: [0.0])
+    link_sprung: list = field(default_factory=lambda: [0])
+
+
+def xyzw(q: np.ndarray) -> np.ndarray:
+    """MuJoCo's wxyz to xyzw, along the last axis."""
+    return np.roll(np.asarray(q, float), -1, axis=-1)
+
+
+def wxyz(q: np.ndarray) -> np.ndarray:
+    """xyzw to MuJoCo's wxyz, along the last axis."""
+    return np.roll(np.asarray(q, float), 1, axis=-1)
+
+
+def compile_mjcf(path: str | Path):
+    """MuJoCo's model of an MJCF file. Raises ModelError."""
+    import mujoco
+
+    path = Path(path)
+    if not path.is_file():
+        raise ModelError(f"{path}: no such file; give the path of an MJCF file, or 'player'")
+    try:
+        return mujoco.MjSpec.from_file(str(path)).compile()
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise ModelError(f"{path}: not a valid MJCF file: {reason}") from None
+
+
+def check_supported(m, path: str | Path) -> None:
+    """Raise ModelError naming the first thing in a compiled model that is not simulated."""
+
+    def refuse(what: str, advice: str) -> None:
+        raise ModelError(f"{path}: {what} is not supported; {advice}")
+
+    for j in range(m.njnt):
+        if m.jnt_type[j] == 2:
+            refuse(f"slide joint '{m.joint(j).name}'", "use free, ball and hinge joints")
+        if m.jnt_type[j] == 0 and m.body_parentid[m.jnt_bodyid[j]] != 0:
+            refuse(f"free joint '{m.joint(j).name}' inside a tree", "put it on a top-level body")
+    for g in range(m.ngeom):
+        collides = m.geom_contype[g] or m.geom_conaffinity[g]
+        kind = int(m.geom_type[g])
+        if kind not in KINDS and collides:
+            refuse(
+                f"{_geom_type(kind)} geom '{m.geom(g).name or g}' that collides",
+                "use capsules, boxes, spheres and planes, or set contype and conaffinity to 0",
+            )
+        if collides and m.geom_condim[g] > 3:
+            refuse(f"condim {m.geom_condim[g]} of geom '{m.geom(g).name or g}'", "use condim 1 or 3")
+        if kind == 0 and m.body_weldid[m.geom_bodyid[g]] != 0:
+            refuse(f"plane '{m.geom(g).name or g}' on a moving body", "planes belong to the world")
+    for count, what in (
+        (m.neq, "an equality constraint"),
+        (m.ntendon, "a tendon"),
+        (m.npair, "an explicit contact pair"),
+        (m.nmocap, "a mocap body"),
+        (m.nflex, "a flex"),
+        (m.nplugin, "a plugin"),
+    ):
+        if count:
+            refuse(what, "remove it from the file")
+    if np.any(m.dof_frictionloss > 0):
+        dof = int(np.argmax(m.dof_frictionloss > 0))
+        refuse(f"frictionloss of joint '{m.joint(m.dof_jntid[dof]).name}'", "use damping")
+    if m.opt.density or m.opt.viscosity:
+        refuse("a fluid medium (option density, viscosity)", "remove it")
+
+
+def _geom_type(kind: int) -> str:
+    import mujoco
+
+    return mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
+
+
+def read_shapes(m) -> list[Shape]:
+    """The geoms that collide, and those that only show, of a supported kind."""
+    shapes = []
+    for g in range(m.ngeom):
+        kind = KINDS.get(int(m.geom_type[g]))
+        if kind is None:
+            continue
+        user = m.geom_user[g] if m.nuser_geom >= 3 else (0.0, 0.2, 1.0e-5)
+        sizes = {"sphere": 1, "capsule": 2, "box": 3, "plane": 0}[kind]
+        shapes.append(
+            Shape(
+                name=m.geom(g).name or f"geom{g}",
+                body=int(m.geom_bodyid[g]) - 1,
+                kind=kind,
+                size=m.geom_size[g, :sizes].copy(),
+                pos=m.geom_pos[g].copy(),
+                quat=xyzw(m.geom_quat[g]),
+                rgba=m.geom_rgba[g].astype(float),
+                friction=float(m.geom_friction[g, 0]),
+                restitution=float(user[0]),
+                erp=float(user[1]),
+                cfm=float(user[2]),
+                condim=int(m.geom_condim[g]),
+                contype=int(m.geom_contype[g]),
+                conaffinity=int(m.geom_conaffinity[g]),
+            )
+        )
+    return shapes
+
+
+def read_links(m) -> tuple[Tables, dict[str, np.ndarray]]:
+    """The kinematic tree: one link per joint, and where each body sits in its link."""
+    t = Tables()
+    body_link = np.zeros(m.nbody, int)
+    body_offset = np.zeros((m.nbody, 3))
+    body_turn = np.tile([0, 0, 0, 1.0], (m.nbody, 1))
+    for b in range(1, m.nbody):
+        parent = int(m.body_parentid[b])
+        link = int(body_link[parent])
+        frame = Rotation.from_quat(body_turn[parent])
+        offset = body_offset[parent] + frame.apply(m.body_pos[b])
+        turn = (frame * Rotation.from_quat(xyzw(m.body_quat[b]))).as_quat()
+        first = int(m.body_jntadr[b])
+        for j in range(first, first + int(m.body_jntnum[b])):
+            joint = {0: FREE, 1: BALL, 3: HINGE}[int(m.jnt_type[j])]
+            anchor = np.zeros(3) if joint == FREE else m.jnt_pos[j]
+            low, high = m.jnt_range[j]
+            q = int(m.jnt_qposadr[j])
+            t.link_parent.append(link)
+            t.link_joint.append(joint)
+            t.link_q.append(q)
+            t.link_dof.append(int(m.jnt_dofadr[j]))
+            t.link_offset.append(offset + Rotation.from_quat(turn).apply(anchor))
+            t.link_turn.append(turn)
+            t.link_axis.append(m.jnt_axis[j].copy())
+            t.link_zero.append(float(m.qpos0[q]) if joint == HINGE else 0.0)
+            t.link_effort.append(ANYWHERE)
+            t.link_limited.append(int(m.jnt_limited[j]))
+            t.link_lower.append(float(low))
+            t.link_upper.append(float(high))
+            t.link_near.append(float(np.cos(0.5 * max(high - 0.3, 0.0))))
+            stiffness = np.atleast_1d(m.jnt_stiffness[j])[0]
+            t.link_sprung.append(int(stiffness > 0 and joint != FREE))
+            if stiffness > 0 and joint == FREE:
+                raise ModelError(f"stiffness of free joint '{m.joint(j).name}' is not supported")
+            link = len(t.link_parent) - 1
+            offset, turn = -anchor, np.array([0, 0, 0, 1.0])
+        body_link[b], body_offset[b], body_turn[b] = link, offset, turn
+    bodies = {"body_link": body_link, "body_offset": body_offset, "body_turn": body_turn}
+    return t, bodies
+
+
+def read_inertia(m, body_link, body_offset, body_turn, link_count: int) -> dict[str, np.ndarray]:
+    """Mass, centre of mass and second moments of each link about its origin, in its axes."""
+    mass = np.zeros(link_count)
+    first = np.zeros((link_count, 3))
+    second = np.zeros((link_count, 3, 3))
+    for b in range(1, m.nbody):
+        i = body_link[b]
+        frame = Rotation.from_quat(body_turn[b])
+        com = body_offset[b] + frame.apply(m.body_ipos[b])
+        R = (frame * Rotation.from_quat(xyzw(m.body_iquat[b]))).as_matrix()
+        k = m.body_mass[b]
+        mass[i] += k
+        first[i] += k * com
+        second[i] += R @ np.diag(m.body_inertia[b]) @ R.T
+        second[i] += k * (com @ com * np.eye(3) - np.outer(com, com))
+    com = np.divide(first, mass[:, None], out=np.zeros_like(first), where=mass[:, None] > 0)
+    return {
+        "link_mass": mass,
+        "link_com": com,
+        "link_moments": second[:, [0, 1, 2], [0, 1, 2]],
+        "link_products": second[:, [0, 0, 1], [1, 2, 2]],
+    }
+
+
+def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """kp, kd per dof [N m/rad, N m s/rad] from position actuators; efforts go into `t`; and notes on
+    actuators that are left to the user."""
+    kp, kd = np.zeros(m.nv), np.zeros(m.nv)
+    effort = np.full(m.nv, ANYWHERE)
+    notes = []
+    for j in range(m.njnt):
+        if m.jnt_actfrclimited[j]:
+            effort[m.jnt_dofadr[j]] = min(np.abs(m.jnt_actfrcrange[j]))
+    for a in range(m.nu):
+        name = m.actuator(a).name or str(a)
+        if int(m.actuator_trntype[a]) not in (0, 1) or int(m.actuator_dyntype[a]) != 0:
+            raise ModelError(f"{path}: actuator '{name}' is not supported; use position actuators")
+        if int(m.actuator_biastype[a]) == 0:
+            notes.append(f"motor '{name}' has no drive: use Simulation.set_joint_force")
+            continue
+        gain, bias = m.actuator_gainprm[a], m.actuator_biasprm[a]
+        if int(m.actuator_biastype[a]) != 1 or not np.isclose(gain[0], -bias[1]) or gain[0] <= 0:
+            raise ModelError(f"{path}: actuator '{name}' is not a position servo (kp, kv)")
+        j = int(m.actuator_trnid[a, 0])
+        gear = m.actuator_gear[a, :3]
+        axis = int(np.argmax(np.abs(gear))) if m.jnt_type[j] == 1 else 0
+        unit = np.eye(3)[axis]
+        if m.jnt_type[j] == 0 or not np.allclose(gear, unit):
+            raise ModelError(f"{path}: actuator '{name}': gear must be one unit axis of a joint")
+        dof = int(m.jnt_dofadr[j]) + axis
+        kp[dof], kd[dof] = gain[0], -bias[2]
+        if m.actuator_forcelimited[a]:
+            effort[dof] = min(effort[dof], *np.abs(m.actuator_forcerange[a]))
+    for i in range(1, len(t.link_joint)):
+        dof = t.link_dof[i]
+        if t.link_joint[i] == BALL:
+            same = all(np.ptp(v[dof : dof + 3]) < 1e-9 for v in (kp, kd))
+            if not same:
+                raise ModelError(f"{path}: a ball joint's three drives must have the same kp and kv")
+            t.link_effort[i] = float(effort[dof : dof + 3].min())
+        elif t.link_joint[i] == HINGE:
+            t.link_effort[i] = float(effort[dof])
+    return kp, kd, notes

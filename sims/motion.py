@@ -1,0 +1,143 @@
+"""A recorded motion as data: a tree of joints, their rotations over time, and where the root goes.
+
+World frame: metres, Z up, ground near z = 0; the rest pose faces +X with the left side toward +Y, as the player does.
+Quaternions are xyzw. End sites of the recording are joints without motion, named `<parent>_end`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joint rotations of a skeleton over time.
+
+    Parents come before their children; the root is joint 0.
+    """
+
+    joint_names: tuple[str, ...]
+    parents: np.ndarray
+    """(joints,) int, -1 for the root."""
+    offsets: np.ndarray
+    """(joints, 3) [m], joint origin in the parent joint's frame; the root's is not used."""
+    rotations: np.ndarray
+    """(frames, joints, 4) [-], xyzw, joint frame in the parent joint's frame."""
+    root_position: np.ndarray
+    """(frames, 3) [m]."""
+    rate: float
+    """[Hz]."""
+    rest_rotations: np.ndarray
+    """(joints, 4) [-], xyzw, the T-pose that calibrates retargeting (identity where none was recorded)."""
+
+    def __post_init__(self):
+        joints, frames = len(self.joint_names), len(self.root_position)
+        for field, shape in (
+            ("parents", (joints,)),
+            ("offsets", (joints, 3)),
+            ("rotations", (frames, joints, 4)),
+            ("root_position", (frames, 3)),
+            ("rest_rotations", (joints, 4)),
+        ):
+            if np.shape(getattr(self, field)) != shape:
+                raise ValueError(f"{field} is {np.shape(getattr(self, field))}, should be {shape}")
+        if frames < 1:
+            raise ValueError("a motion needs at least one frame")
+        if self.parents[0] != -1 or np.any(self.parents[1:] >= np.arange(1, joints)):
+            raise ValueError("parents must come before their children, with one root first")
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.root_position)
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first to the last frame."""
+        return (self.frame_count - 1) / self.rate
+
+    def index(self, joint: str) -> int:
+        """Number of a joint. Raises ValueError that lists the names there are."""
+        try:
+            return self.joint_names.index(joint)
+        except ValueError:
+            raise ValueError(
+                f"no joint '{joint}' in this motion; it has {', '.join(self.joint_names)}"
+            ) from None
+
+    def slice(self, first: int, last: int) -> Motion:
+        """Frames first..last, both included. Raises ValueError when they are not in the motion."""
+        if not 0 <= first < last < self.frame_count:
+            raise ValueError(
+                f"frames {first} to {last} are not a range within 0 to {self.frame_count - 1}"
+            )
+        part = slice(first, last + 1)
+        return replace(
+            self, rotations=self.rotations[part], root_position=self.root_position[part]
+        )
+
+    def resample(self, rate: float) -> Motion:
+        """The same motion at another rate [Hz].
+
+        Rotations move along geodesics between the recorded frames, the root along straight lines. The last frame
+        is kept to within half a new frame.
+        """
+        if rate <= 0:
+            raise ValueError(f"a rate must be positive, not {rate}")
+        count = int(round(self.duration * rate)) + 1
+        at = np.linspace(0.0, self.frame_count - 1.0, count) if count > 1 else np.zeros(1)
+        return replace(
+            self,
+            rotations=interpolate_rotations(self.rotations, at),
+            root_position=interpolate_lines(self.root_position, at),
+            rate=(count - 1) / self.duration if count > 1 else rate,
+        )
+
+    def forward(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forward kinematics: joint origins (frames, joints, 3) [m] and joint frames (frames, joints, 4) xyzw."""
+        return _forward(self.parents, self.offsets, self.rotations, self.root_position)
+
+    def rest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forward kinematics of the rest pose, root at the origin: (joints, 3) [m], (joints, 4)."""
+        positions, frames = _forward(
+            self.parents, self.offsets, self.rest_rotations[None], np.zeros((1, 3))
+        )
+        return positions[0], frames[0]
+
+
+def _forward(parents, offsets, rotations, root_position):
+    positions = np.empty((*rotations.shape[:2], 3))
+    frames = [Rotation.from_quat(rotations[:, 0])]
+    positions[:, 0] = root_position
+    for joint in range(1, len(parents)):
+        parent = frames[parents[joint]]
+        frames.append(parent * Rotation.from_quat(rotations[:, joint]))
+        positions[:, joint] = positions[:, parents[joint]] + parent.apply(offsets[joint])
+    return positions, np.stack([f.as_quat() for f in frames], axis=1)
+
+
+def interpolate_lines(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Linear interpolation of values (frames, ...) at fractional frame numbers `at` (n,)."""
+    low, share = _bracket(len(values), at)
+    share = share.reshape(-1, *(1,) * (values.ndim - 1))
+    high = np.minimum(low + 1, len(values) - 1)
+    return values[low] + share * (values[high] - values[low])
+
+
+def interpolate_rotations(quaternions: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Geodesic interpolation of quaternions (frames, ..., 4) xyzw at fractional frame numbers `at` (n,)."""
+    low, share = _bracket(len(quaternions), at)
+    high = np.minimum(low + 1, len(quaternions) - 1)
+    shape = (len(at), *quaternions.shape[1:])
+    start = Rotation.from_quat(quaternions[low].reshape(-1, 4))
+    turn = (start.inv() * Rotation.from_quat(quaternions[high].reshape(-1, 4))).as_rotvec()
+    turn = turn.reshape(*shape[:-1], 3) * share.reshape(-1, *(1,) * (len(shape) - 1))
+    return (start * Rotation.from_rotvec(turn.reshape(-1, 3))).as_quat().reshape(shape)
+
+
+def _bracket(frames: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    at = np.clip(np.asarray(at, dtype=float), 0.0, frames - 1.0)
+    low = np.minimum(at.astype(int), max(frames - 2, 0))
+    return low, at - low

@@ -1,0 +1,176 @@
+"""Reference motion of a model: its joint coordinates over time, and how one cycle becomes many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from .motion import interpolate_lines, interpolate_rotations
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the model should do, one row per time step."""
+
+    joint_q: np.ndarray
+    """(frames, nq) [m, rad, -], as `Simulation.joint_q`."""
+    timestep: float
+    """[s] between rows."""
+
+    @property
+    def frame_count(self) -> int:
+        return len(self.joint_q)
+
+    @property
+    def duration(self) -> float:
+        """[s] from the first to the last row."""
+        return (self.frame_count - 1) * self.timestep
+
+    def velocity(self, model) -> np.ndarray:
+        """joint_qd (frames, nv) [m/s, rad/s] by differences to the next row (the last row keeps its own)."""
+        if self.frame_count < 2:
+            return np.zeros((self.frame_count, model.nv))
+        steps = difference(model, self.joint_q[:-1], self.joint_q[1:]) / self.timestep
+        return np.concatenate([steps, steps[-1:]])
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A reference whose last row is the first one again, moved over the ground."""
+
+    reference: Reference
+    """The closed cycle; its last row begins the next."""
+    turn: float
+    """[rad] about the vertical per cycle."""
+    travel: np.ndarray
+    """(2,) [m] of the root over the ground per cycle, seen from the cycle's first root position."""
+    gap: float
+    """[rad] root mean square over the model's joints of what had to be closed."""
+
+    def repeat(self, model, count: int) -> Reference:
+        """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count < 1."""
+        if count < 1:
+            raise ValueError(f"a cycle is repeated at least once, not {count} times")
+        body = self.reference.joint_q[:-1]
+        pieces, start = [], self.reference.joint_q[:1]
+        root = model.q_slice(root_joint(model))
+        for number in range(count):
+            pieces.append(self._moved(body, root, number))
+        pieces.append(self._moved(start, root, count))
+        return replace(self.reference, joint_q=np.concatenate(pieces))
+
+    def _moved(self, joint_q, root: slice, number: int) -> np.ndarray:
+        anchor = self.reference.joint_q[0, root][:2]
+        place = np.zeros(2)
+        for i in range(number):
+            place = place + _plane(i * self.turn) @ self.travel
+        joint_q = joint_q.copy()
+        joint_q[:, root] = _over_ground(
+            joint_q[:, root], anchor, anchor + place, number * self.turn
+        )
+        return joint_q
+
+
+def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=np.radians(20.0)):
+    """Make the last row of a reference meet its first, spreading what is missing evenly over the rows.
+
+    The way over the ground is kept as the cycle's travel and turn when the root ends more than `travel_above` [m] or
+    `turn_above` [rad] from where it began; a smaller one is drift of somebody who stays in place, and is closed too.
+    P1 7.1 blends at the ends only; spreading adds no velocity step. Returns a Cycle.
+    """
+    root = model.q_slice(root_joint(model))
+    first, last = reference.joint_q[0], reference.joint_q[-1]
+    turn = _heading(last[root]) - _heading(first[root])
+    turn = float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    travel = last[root][:2] - first[root][:2]
+    if np.linalg.norm(travel) < travel_above and abs(turn) < turn_above:
+        turn, travel = 0.0, np.zeros(2)
+    goal = first.copy()
+    anchor = first[root][:2]
+    goal[root] = _over_ground(first[root][None], anchor, anchor + travel, turn)[0]
+    missing = difference(model, last[None], goal[None])
+    share = np.linspace(0.0, 1.0, reference.frame_count)[:, None]
+    closed = integrate(model, reference.joint_q, share * missing)
+    size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
+    return Cycle(replace(reference, joint_q=closed), turn, travel, float(size))
+
+
+def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Rows of joint_q (frames, nq) at fractional frame numbers `at` (n,): geodesics for rotations, lines for the rest."""
+    out = interpolate_lines(joint_q, at)
+    for start in model.quaternions():
+        place = slice(start, start + 4)
+        out[:, place] = interpolate_rotations(joint_q[:, place], at)
+    return out
+
+
+def difference(model, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """The motion (..., nv) that carries joint coordinates `start` (..., nq) to `end` in unit time."""
+    out = np.zeros((*start.shape[:-1], model.nv))
+    for name in model.joint_names:
+        q, dof = model.q_slice(name), model.dof_slice(name)
+        if model.joint_type(name) == "hinge":
+            out[..., dof] = end[..., q] - start[..., q]
+        else:
+            turn = slice(q.stop - 4, q.stop)
+            out[..., dof.stop - 3 : dof.stop] = _turn(start[..., turn], end[..., turn])
+        if model.joint_type(name) == "free":
+            lines = slice(q.start, q.start + 3)
+            out[..., dof.start : dof.start + 3] = end[..., lines] - start[..., lines]
+    return out
+
+
+def integrate(model, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Joint coordinates (..., nq) reached from `start` by `motion` (..., nv) in unit time; undoes `difference`."""
+    out = np.array(start, dtype=float)
+    for name in model.joint_names:
+        q, dof = model.q_slice(name), model.dof_slice(name)
+        if model.joint_type(name) == "hinge":
+            out[..., q] += motion[..., dof]
+        else:
+            turn = slice(q.stop - 4, q.stop)
+            by = Rotation.from_rotvec(motion[..., dof.stop - 3 : dof.stop].reshape(-1, 3))
+            end = Rotation.from_quat(out[..., turn].reshape(-1, 4)) * by
+            out[..., turn] = end.as_quat().reshape(out[..., turn].shape)
+        if model.joint_type(name) == "free":
+            out[..., q.start : q.start + 3] += motion[..., dof.start : dof.start + 3]
+    return out
+
+
+def root_joint(model) -> str:
+    """Name of the free joint of the model's first tree. Raises ValueError when it has none."""
+    name = model.joint_names[0]
+    if model.joint_type(name) != "free":
+        raise ValueError(f"the model's first joint '{name}' is not free: it has no root to move")
+    return name
+
+
+def _joint_dofs(model) -> np.ndarray:
+    dofs = [model.dof_slice(n) for n in model.joint_names if model.joint_type(n) != "free"]
+    return np.concatenate([np.arange(d.start, d.stop) for d in dofs])
+
+
+def _turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    start, shape = Rotation.from_quat(start.reshape(-1, 4)), start.shape[:-1]
+    return (start.inv() * Rotation.from_quat(end.reshape(-1, 4))).as_rotvec().reshape(*shape, 3)
+
+
+def _heading(pose: np.ndarray) -> float:
+    """[rad] about the vertical of a root pose (7,)."""
+    forward = Rotation.from_quat(pose[3:]).apply([1.0, 0.0, 0.0])
+    return float(np.arctan2(forward[1], forward[0]))
+
+
+def _plane(angle: float) -> np.ndarray:
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def _over_ground(poses, pivot, place, turn: float) -> np.ndarray:
+    """Root poses (frames, 7) turned about the vertical through `pivot` (2,), which then lies at `place` (2,)."""
+    poses = np.array(poses, dtype=float)
+    poses[:, :2] = (poses[:, :2] - pivot) @ _plane(turn).T + place
+    by = Rotation.from_rotvec([0.0, 0.0, turn])
+    poses[:, 3:] = (by * Rotation.from_quat(poses[:, 3:])).as_quat()
+    return poses

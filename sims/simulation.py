@@ -1,0 +1,321 @@
+"""`Simulation`: many worlds of one model that step together."""
+
+from __future__ import annotations
+
+import os
+import platform
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+
+from .. import kernels
+from .model import Model
+
+RESPONSE_ROOM = 1365
+"""Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
+
+SWEEPS = 10
+"""Sweeps of the contact solver a step; docs/contact.md shows the residual this leaves."""
+
+
+def widest_lanes() -> int:
+    """Worlds that one vector register of this processor holds."""
+    machine = platform.machine().lower()
+    if machine in ("aarch64", "arm64"):
+        return 4
+    try:
+        flags = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return 8 if machine in ("x86_64", "amd64") else 4
+    return 16 if "avx512f" in flags else 8 if "avx2" in flags else 4
+
+
+class Simulation:
+    """`world_count` worlds of a model.
+
+    A CPU steps `lanes` worlds in one pass of its vector unit and shares them among `threads`; on
+    CUDA every world has a thread. Neither choice changes a result beyond rounding, and `threads` not
+    at all.
+
+    Arrays are `(world_count, n)` NumPy arrays, float32.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        world_count: int = 1,
+        device: str = "cpu",
+        threads: int | None = None,
+        lanes: int | None = None,
+        sweeps: int = SWEEPS,
+    ):
+        if world_count < 1:
+            raise ValueError(f"world_count must be at least 1, not {world_count}")
+        self.model = model
+        self.world_count = world_count
+        self.device = wp.get_device(device)
+        on_cpu = self.device.is_cpu
+        self.lanes = lanes or (widest_lanes() if on_cpu else 1)
+        if not on_cpu and self.lanes != 1:
+            raise ValueError("lanes are for the CPU; on CUDA leave them out")
+        self._program = kernels.program(self.lanes)
+        self.groups = -(-world_count // self.lanes)
+        self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self._tree = self._make_tree(sweeps)
+        self._world = self._make_world()
+        self._targets_set = False
+        self._fill_defaults()
+        self.reset()
+
+    # ----------------------------------------------------------------------------------- memory
+
+    def _make_tree(self, sweeps: int):
+        """The model as the kernels' `Tree`."""
+        program, model = self._program, self.model
+        tree = program.Tree()
+        for name, var in program.Tree.vars.items():
+            if isinstance(var.type, wp.array):
+                rows = model.tables.get(name, np.zeros(0))
+                rows = np.asarray(rows, np.int32 if var.type.dtype is wp.int32 else np.float32)
+                setattr(tree, name, wp.array(rows, dtype=var.type.dtype, device=self.device))
+        tree.h = model.timestep
+        tree.gravity = wp.vec3(*model.tables["gravity"])
+        tree.link_count = len(model.tables["link_parent"]) - 1
+        tree.q_count, tree.dof_count = model.nq, model.nv
+        tree.slot_count = len(model.tables.get("slot_kind", ()))
+        tree.sweeps = sweeps
+        tree.forced = 0
+        lengths = model.tables.get("slot_length", np.zeros(0, int))
+        tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + 2 * len(lengths)))
+        return tree
+
+    def _make_world(self):
+        """State of all worlds, `(groups, n)` each."""
+        program, model, tree = self._program, self.model, self._tree
+        links = tree.link_count + 1
+        longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + 2
+        counts = dict.fromkeys(("q", "target"), model.nq)
+        counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
+        counts |= dict.fromkeys(
+            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "touched"), links
+        )
+        counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
+        counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
+        counts |= dict.fromkeys(("broken", "fallen", "fumbled"), 1)
+        counts |= {
+            "force": model.nbody,
+            "y": tree.response_room + longest,
+            "active": 2 * tree.slot_count + 1,
+        }
+        world = program.World()
+        for name, var in program.World.vars.items():
+            setattr(world, name, self._allocate(counts[name], var.type.dtype))
+        return world
+
+    def _allocate(self, count: int, dtype) -> wp.array:
+        """Zeros `(groups, count)`; on CUDA stored with the worlds side by side."""
+        count = max(count, 1)
+        if self.device.is_cpu:
+            return wp.zeros((self.groups, count), dtype=dtype, device=self.device)
+        return wp.zeros((count, self.groups), dtype=dtype, device=self.device).transpose()
+
+    def _fill_defaults(self) -> None:
+        pairs = self.model.pairs
+        everyone = np.arange(self.world_count)
+        self._write("mass_scale", everyone, np.ones(self._tree.link_count + 1))
+        for name in ("friction", "restitution"):
+            if pairs:
+                self._write(name, everyone, np.array([pair[name] for pair in pairs]))
+        ground = np.array([0, 0, 0, 1], np.float32)
+        self._write("turn", everyone, ground, column=0)
+        self._write("R", everyone, np.eye(3, dtype=np.float32).ravel(), column=0)
+
+    def _rows(self, name: str) -> np.ndarray:
+        """A state array as float32 `(groups, n, parts, lanes)`; on a CPU a view, on CUDA a copy."""
+        array = getattr(self._world, name)
+        if self.device.is_cpu:
+            rows = array.numpy()
+        else:
+            rows = np.ascontiguousarray(array.transpose().numpy().swapaxes(0, 1))
+        rows = rows.view(np.float32) if rows.dtype.fields else rows
+        return rows.reshape(self.groups, array.shape[1], -1, self.lanes)
+
+    def _read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
+        """`(world_count, n, parts)` of a state array, parts dropped where there is one."""
+        rows = self._rows(name)
+        rows = rows[:, first : None if count is None else first + count]
+        rows = rows.transpose(0, 3, 1, 2).reshape(-1, *rows.shape[1:3])[: self.world_count]
+        return rows[..., 0].copy() if rows.shape[-1] == 1 else rows.copy()
+
+    def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
+        """Set a state array of some worlds; `values` `(n)` or `(len(worlds), n)`, parts flattened. World
+        numbers beyond world_count fill up the last group and follow the last world."""
+        rows = self._rows(name)
+        values = np.asarray(values, np.float32)
+        values = values.reshape(*values.shape[:1], -1) if values.ndim > 1 else values
+        n, parts = rows.shape[1:3]
+        if column is not None:
+            n = 1
+        values = np.broadcast_to(values.reshape(-1, n, parts), (len(worlds), n, parts))
+        last = self.world_count - 1
+        if self.groups * self.lanes > self.world_count and len(worlds) and worlds[-1] == last:
+            spare = np.arange(self.world_count, self.groups * self.lanes)
+            worlds = np.concatenate([worlds, spare])
+            values = np.concatenate([values, np.repeat(values[-1:], len(spare), 0)])
+        group, lane = np.divmod(worlds, self.lanes)
+        where = slice(None) if column is None else slice(column, column + 1)
+        if column is None:
+            rows[group, :, :, lane] = values
+        else:
+            rows[group, column, :, lane] = values[:, 0]
+        del where
+        if not self.device.is_cpu:
+            array = getattr(self._world, name)
+            flat = np.ascontiguousarray(rows[..., 0].swapaxes(0, 1)).reshape(-1)
+            source = wp.array(
+                flat.view(array.transpose().numpy().dtype).reshape(array.shape[::-1])
+                if flat.size
+                else flat,
+                dtype=array.dtype,
+                device=self.device,
+            )
+            wp.copy(array.transpose(), source)
+
+    # ------------------------------------------------------------------------------------ control
+
+    def _worlds(self, worlds) -> np.ndarray:
+        if worlds is None:
+            return np.arange(self.world_count)
+        worlds = np.atleast_1d(np.asarray(worlds))
+        if worlds.dtype == bool:
+            if worlds.shape != (self.world_count,):
+                raise ValueError(f"a mask of worlds must have shape ({self.world_count},)")
+            return np.flatnonzero(worlds)
+        if worlds.size and not (0 <= worlds.min() and worlds.max() < self.world_count):
+            raise IndexError(f"worlds must lie in 0 .. {self.world_count - 1}")
+        return worlds.astype(int)
+
+    def _values(self, name: str, values, n: int, count: int) -> np.ndarray:
+        """Checked `(n,)` or `(count, n)` float32."""
+        values = np.asarray(values, np.float32)
+        if values.shape not in ((n,), (count, n), (1, n)):
+            raise ValueError(f"{name} must have shape ({n},) or ({count}, {n}), not {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} has values that are not finite")
+        return values
+
+    def _unit(self, q: np.ndarray, name: str) -> np.ndarray:
+        """joint_q with its quaternions normalised."""
+        q = q.copy()
+        for k in self.model.quaternions():
+            length = np.linalg.norm(q[..., k : k + 4], axis=-1, keepdims=True)
+            if (length < 0.1).any():
+                raise ValueError(f"{name}[{k}:{k + 4}] must be a unit quaternion (xyzw)")
+            q[..., k : k + 4] /= length
+        return q
+
+    def reset(self, worlds=None, joint_q=None, joint_qd=None) -> None:
+        """Put worlds into a state: by default all of them, the model's start pose, at rest.
+
+        joint_q: (nq,) or (len(worlds), nq) [m, rad, -]; joint_qd likewise (nv) [m/s, rad/s]. Clears
+        status and contact history. Where no targets were set yet, the pose becomes the target.
+        """
+        worlds = self._worlds(worlds)
+        model = self.model
+        if joint_q is None:
+            joint_q = model.start_q
+        q = self._unit(self._values("joint_q", joint_q, model.nq, len(worlds)), "joint_q")
+        qd = np.zeros(model.nv) if joint_qd is None else joint_qd
+        qd = self._values("joint_qd", qd, model.nv, len(worlds))
+        self._write("q", worlds, q)
+        self._write("qd", worlds, qd)
+        if not self._targets_set:
+            self._write("target", worlds, q)
+        for name in ("broken", "fallen", "fumbled"):
+            self._write(name, worlds, np.zeros(1))
+        self._write("impulse", worlds, np.zeros(self._rows("impulse").shape[1] * 3))
+
+    def set_targets(self, joint_target_q) -> None:
+        """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
+        target = self._values("joint_target_q", joint_target_q, self.model.nq, self.world_count)
+        target = self._unit(target, "joint_target_q")
+        self._write("target", np.arange(self.world_count), target)
+        self._targets_set = True
+
+    def set_joint_force(self, joint_f) -> None:
+        """Generalised forces on all dofs, until changed: (nv,) or (world_count, nv) [N, N m]."""
+        f = self._values("joint_f", joint_f, self.model.nv, self.world_count)
+        self._write("joint_f", np.arange(self.world_count), f)
+
+    def apply_force(self, body: str | int, force, worlds=None) -> None:
+        """A force (3,) or (len(worlds), 3) [N, world axes] at a body's centre of mass, until changed."""
+        worlds = self._worlds(worlds)
+        body = self.model.body(body) if isinstance(body, str) else int(body)
+        force = self._values("force", force, 3, len(worlds))
+        self._write("force", worlds, np.atleast_2d(force), column=body)
+        self._tree.forced = 1
+
+    def set_root_drive(
+        self,
+        kp_linear: float,
+        kd_linear: float,
+        kp_angular: float,
+        kd_angular: float,
+        joint: str | None = None,
+    ) -> None:
+        """Virtual drive that pulls a free joint (default: the first) towards its target, with the same
+        implicit law as the other drives; zeros set it free. [N/m, N s/m, N m/rad, N m s/rad]"""
+        model = self.model
+        free = [name for name in model.joint_names if model.joint_type(name) == "free"]
+        if not free:
+            raise ValueError("the model has no free joint")
+        if joint is not None and joint not in free:
+            raise ValueError(f"{joint!r} is not a free joint; there are: {', '.join(free)}")
+        first = model.dof_slice(joint or free[0]).start
+        for name, linear, angular in (
+            ("dof_kp", kp_linear, kp_angular),
+            ("dof_kd", kd_linear, kd_angular),
+        ):
+            gains = getattr(self._tree, name).numpy().copy()
+            gains[first : first + 3], gains[first + 3 : first + 6] = linear, angular
+            getattr(self._tree, name).assign(gains)
+
+    def step(self, count: int = 1) -> None:
+        """Advance all worlds by `count` steps of `model.timestep`."""
+        self.launch("step", count)
+
+    def launch(self, kernel: str, count: int = 1) -> None:
+        """Run a kernel of `kernels.step`, or a part of a step by its name, `count` times."""
+        function = getattr(self._program, kernel)
+        size = -(-self.groups // self.threads)
+
+        def run(first: int) -> None:
+            wp.launch(
+                function,
+                dim=min(size, self.groups - first),
+                inputs=[self._tree, self._world, first, count],
+                device=self.device,
+            )
+
+        starts = range(0, self.groups, size)
+        if self._pool is None:
+            for first in starts:
+                run(first)
+        else:
+            self._program.load(self.device)
+            list(self._pool.map(run, starts))
+
+    # ------------------------------------------------------------------------------- observations
+
+    @property
+    def joint_q(self) -> np.ndarray:
+        """(world_count, nq) [m, rad, -]"""
+        return self._read("q", 0, self.model.nq)
+
+    @property
+    def joint_qd(self) -> np.ndarray:
+        """(world_count, nv) [m/s, rad/s]"""
+        return self._read("qd", 0, self.model.nv)

@@ -1,0 +1,160 @@
+"""The five folders import as warpdribble.* from a wheel, an sdist, an editable or bare checkout.
+
+Everything is built from a copy of the tree, offline, with the installed setuptools.
+"""
+
+import compileall
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ["warpdribble", "kernels", "sims", "learning", "assets"]
+NOT_SOURCE = shutil.ignore_patterns(
+    ".git", ".venv*", "venv*", "build", "dist", "out", "*.egg-info", "__pycache__", ".*_cache",
+    ".hypothesis", "shared",
+)  # fmt: skip
+
+IMPORT_ALL = """
+from importlib import import_module, resources
+for name in ["", ".kernels", ".sims", ".learning", ".assets"]:
+    module = import_module("warpdribble" + name)
+    print(module.__name__, module.__file__)
+assert (resources.files("warpdribble.assets") / "player.xml").is_file()
+"""
+
+
+def run(*command, cwd):
+    done = subprocess.run([*map(str, command)], cwd=cwd, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def copy_tree(to):
+    return shutil.copytree(ROOT, to, ignore=NOT_SOURCE)
+
+
+def build(kind, tree, out):
+    """Let setuptools build one wheel or sdist of tree; returns its path."""
+    pytest.importorskip("setuptools", minversion="77")
+    script = f"from setuptools import build_meta as b; print(b.build_{kind}({str(out)!r}))"
+    return out / run(sys.executable, "-c", script, cwd=tree).splitlines()[-1]
+
+
+def make_env(folder):
+    """An environment without warpdribble that sees this one's other packages; returns its python.
+
+    A path in a .pth file comes last and its own .pth files (an editable install's) are not read.
+    """
+    run(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder.parent)
+    paths = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    (site,) = folder.glob("lib/python*/site-packages")
+    (site / "others.pth").write_text("\n".join(sorted(paths)))
+    return folder / "bin" / "python"
+
+
+def install(env_python, *what):
+    offline = ["--no-index", "--no-deps", "--no-build-isolation", "--ignore-installed"]
+    pip = [sys.executable, "-m", "pip", "--python", env_python]
+    run(*pip, "install", "-q", *offline, *what, cwd=env_python.parent)
+
+
+def check_imports(env_python, cwd, below):
+    """All five packages import, from below this folder, and the player is found."""
+    files = [line.split()[1] for line in run(env_python, "-c", IMPORT_ALL, cwd=cwd).splitlines()
+             if line.startswith("warpdribble")]  # fmt: skip
+    assert len(files) == len(FOLDERS)
+    assert all(Path(file).is_relative_to(below) for file in files), files
+
+
+def test_bare_checkout_imports(tmp_path):
+    tree = copy_tree(tmp_path / "tree")
+    check_imports(make_env(tmp_path / "env"), cwd=tree, below=tree)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("via_sdist", [False, True], ids=["wheel", "sdist-wheel"])
+def test_wheel_imports(tmp_path, via_sdist):
+    tree = copy_tree(tmp_path / "tree")
+    if via_sdist:
+        with tarfile.open(build("sdist", tree, tmp_path)) as sdist:
+            sdist.extractall(tmp_path / "sdist", filter="data")
+        (tree,) = (tmp_path / "sdist").iterdir()
+    compileall.compile_dir(tree / "assets", quiet=1)  # must not end in the wheel
+    wheel = build("wheel", tree, tmp_path)
+
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for folder in FOLDERS:
+        prefix = "" if folder == "warpdribble" else "warpdribble/"
+        pattern = "*" if folder == "assets" else "*.py"
+        files = [f.relative_to(ROOT) for f in (ROOT / folder).rglob(pattern) if f.is_file()]
+        expected = {prefix + f.as_posix() for f in files if "__pycache__" not in f.parts}
+        assert expected <= names, expected - names
+    assert not [n for n in names if "__pycache__" in n or n.startswith(("tests", "kernels"))]
+
+    env_python = make_env(tmp_path / "env")
+    install(env_python, wheel)
+    check_imports(env_python, cwd=tmp_path, below=tmp_path / "env")
+
+
+@pytest.mark.slow
+def test_editable_imports_and_sees_edits(tmp_path):
+    pytest.importorskip("setuptools", minversion="77")
+    tree = copy_tree(tmp_path / "tree")
+    env_python = make_env(tmp_path / "env")
+    install(env_python, "-e", tree)
+    check_imports(env_python, cwd=tmp_path, below=tree)
+    (tree / "sims" / "just_added.py").write_text("")
+    run(env_python, "-c", "import warpdribble.sims.just_added", cwd=tmp_path)
+
+
+@pytest.mark.slow
+def test_version_comes_from_the_package(tmp_path):
+    wheel = build("wheel", copy_tree(tmp_path / "tree"), tmp_path)
+    import warpdribble
+
+    assert wheel.name.split("-")[1] == warpdribble.__version__
+
+
+def test_pyproject_lists_what_exists():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    mapping = project["tool"]["setuptools"]["package-dir"]
+    assert sorted(mapping.values()) == sorted(FOLDERS)
+    assert sorted(mapping) == sorted(project["tool"]["setuptools"]["packages"])
+    for folder in FOLDERS:
+        assert (ROOT / folder / "__init__.py").is_file()
+        sub = [p.parent for p in (ROOT / folder).glob("*/**/__init__.py")]
+        assert not sub, f"{sub}: a sub-package needs a line in pyproject.toml"
+
+
+def test_import_is_light():
+    heavy = ["torch", "pxr", "warp", "mujoco", "numpy", "matplotlib"]
+    script = f"import sys, warpdribble; print([m for m in {heavy} if m in sys.modules])"
+    assert run(sys.executable, "-c", script, cwd=ROOT).strip() == "[]"
+
+
+def test_unknown_name_is_an_attribute_error():
+    import warpdribble
+
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = warpdribble.no_such_name
+
+
+def test_no_file_names_a_path_of_one_machine(tmp_path):
+    private = re.compile(r"(?<![\w.])/(home|Users|root|work|workspace)/\w|[A-Z]:\\Users\\")
+    found = []
+    for file in copy_tree(tmp_path / "tree").rglob("*"):
+        try:
+            text = file.read_text() if file.is_file() else ""
+        except UnicodeDecodeError:
+            continue
+        found += [f"{file.name}: {line}" for line in text.splitlines() if private.search(line)]
+    assert not found

@@ -1,0 +1,222 @@
+"""A dribble written down instead of recorded: standing, right hand, in place, cyclic, the same every time.
+
+The ball comes first: it falls from the hand, bounces by the law of restitution, meets the hand again, and is carried up
+and pushed down so that it leaves as it did a cycle before. The hand stays on the ball while it has it. The rest of the
+body stands, leans, looks ahead and gives a little with every push; arms and legs are solved for hands and feet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+from .sims import pose
+from .sims.reference import Reference, resample_q, root_joint
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Dribble:
+    """Numbers of the authored dribble. Lengths in metres, times in seconds, angles in degrees, speeds in m/s."""
+
+    period: float = 0.72
+    release_height: float = 0.775
+    """Of the ball's centre, where it leaves the hand and where it comes back to it."""
+    release_speed: float = 3.3
+    """Downward."""
+    restitution: float = 0.8
+    lowest_palm: float = 0.785
+    """The hand follows through to here before it rises to meet the ball."""
+    ball_place: tuple[float, float] = (0.36, -0.29)
+    """Forward and left of the middle between the feet."""
+    pelvis_height: float = 0.87
+    pelvis_back: float = 0.05
+    give: float = 0.008
+    """Amplitude of the pelvis' bob."""
+    lean: tuple[float, float, float] = (10.0, 11.0, 10.0)
+    """Forward bend of pelvis, lower back and torso."""
+    gaze: float = 12.0
+    """Below the horizon."""
+    feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
+    """Left and right ankle: forward, left, turned out."""
+    curl: float = 0.35
+    """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
+    fingers: tuple[float, float] = (14.0, 38.0)
+    """Tilt of the fingers below the horizon, at the top of the stroke and after the release."""
+
+
+@dataclass(frozen=True)
+class AuthoredClip:
+    """A cyclic reference, its last row the first one again, and when the hand has the ball."""
+
+    reference: Reference
+    hand: str
+    """Body that dribbles."""
+    contact: tuple[float, float]
+    """[s] from the first row: the hand catches and releases the ball. The clip begins at a release."""
+    lowest: float
+    """[s] from the first row: the hand is lowest."""
+    restitution: float
+
+
+def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
+    """The authored right-hand dribble on the player, at its time step; the ball's path is in its coordinates.
+
+    Raises ValueError when the numbers ask for a ball that does not come back to the hand.
+    """
+    steps = round(style.period / model.timestep)
+    times = np.arange(steps + 1) * model.timestep
+    period = steps * model.timestep
+    ball_body = model.body("ball")
+    radius = next(s.size[0] for s in model.shapes if s.body == ball_body)
+    flight, ball_height, palm_height = _stroke(style, period, radius)
+    phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
+
+    joint_q = np.tile(_fingers(model, style.curl), (steps + 1, 1))
+    _trunk(model, joint_q, style, phase)
+    _legs(model, joint_q, style)
+    _left_arm(model, joint_q, phase)
+    palm = np.column_stack([np.tile(style.ball_place, (steps + 1, 1)), palm_height(times % period)])
+    tilt = np.interp(np.cos(phase), [-1.0, 1.0], style.fingers[::-1])
+    _right_arm(model, joint_q, palm, np.radians(tilt))
+    ball = model.q_slice("ball")
+    joint_q[:, ball.start : ball.start + 2] = style.ball_place
+    joint_q[:, ball.start + 2] = ball_height(times % period)
+    joint_q[-1] = joint_q[0]
+    lowest = float(times[np.argmin(palm[:, 2])])
+    return AuthoredClip(
+        Reference(joint_q, model.timestep), "r_hand", (flight, period), lowest, style.restitution
+    )
+
+
+def ball_flight(height: float, speed: float, restitution: float, radius: float):
+    """Down, bounce and up again to the same height: time down [s], time up [s], speed back at that height [m/s].
+
+    height: of the centre [m] where it starts with `speed` [m/s] downward. Raises ValueError if it does not come back.
+    """
+    fall = height - radius
+    impact = np.sqrt(speed**2 + 2.0 * GRAVITY * fall)
+    left = (restitution * impact) ** 2 - 2.0 * GRAVITY * fall
+    if left <= 0.0:
+        raise ValueError(
+            f"a ball released at {height} m with {speed} m/s does not come back to that height"
+        )
+    back = float(np.sqrt(left))
+    return (impact - speed) / GRAVITY, (restitution * impact - back) / GRAVITY, back
+
+
+def _stroke(style: Dribble, period: float, radius: float):
+    """Duration of the flight, and heights of ball and palm as functions of the time since the release."""
+    down, up, back = ball_flight(
+        style.release_height, style.release_speed, style.restitution, radius
+    )
+    flight = down + up
+    if flight > 0.8 * period:
+        raise ValueError(f"the ball is in the air for {flight:.2f} s of a {period:.2f} s cycle")
+    z, v = style.release_height, style.release_speed
+    carried = CubicHermiteSpline([flight, period], [z, z], [back, -v])
+    impact = v + GRAVITY * down
+
+    def ball(t):
+        falling = z - v * t - 0.5 * GRAVITY * t**2
+        since = t - down
+        rising = radius + style.restitution * impact * since - 0.5 * GRAVITY * since**2
+        return np.where(t < down, falling, np.where(t < flight, rising, carried(t)))
+
+    touch = z + radius
+    turn = 2.0 * (touch - style.lowest_palm) / v
+    empty = CubicHermiteSpline(
+        [0.0, turn, flight], [touch, style.lowest_palm, touch], [-v, 0.0, back]
+    )
+
+    def palm(t):
+        return np.where(t < flight, empty(np.minimum(t, flight)), carried(t) + radius)
+
+    return flight, ball, palm
+
+
+def _fingers(model, curl: float) -> np.ndarray:
+    """The start pose (nq,) with the right fingers part of the way from flat to it."""
+    poses = np.stack([model.keyframes["flat"], model.start_q])
+    joint_q = np.array(model.start_q, dtype=float)
+    between = resample_q(model, poses, np.array([curl]))[0]
+    for joint in model.joint_names:
+        if joint.startswith("r_") and joint.endswith(("_mcp", "_pip", "_dip")):
+            joint_q[model.q_slice(joint)] = between[model.q_slice(joint)]
+    return joint_q
+
+
+def _trunk(model, joint_q, style: Dribble, phase) -> None:
+    root = model.q_slice(root_joint(model))
+    joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
+    joint_q[:, root.start + 1] = -0.01
+    joint_q[:, root.start + 2] = style.pelvis_height + style.give * np.cos(phase)
+    sway = 1.2 * np.cos(phase - 0.5)
+    for place, bend, yaw in (
+        (slice(root.start + 3, root.stop), style.lean[0], 1.0),
+        (model.q_slice("lower_back"), style.lean[1], 1.5),
+        (model.q_slice("torso"), style.lean[2], 1.5),
+        (model.q_slice("neck"), style.gaze - sum(style.lean), -4.0),
+    ):
+        angles = np.column_stack([yaw * np.sin(phase) - 1.0 * yaw, bend - sway, 0.0 * phase])
+        joint_q[:, place] = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
+
+
+def _legs(model, joint_q, style: Dribble) -> None:
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    for side, (forward, left, out) in zip("lr", style.feet):
+        ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])
+        foot = Rotation.from_euler("z", out, degrees=True)
+        knee_axis = foot.apply([0.0, 1.0, 0.0])
+        _place(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
+
+
+def _left_arm(model, joint_q, phase) -> None:
+    """Hangs beside the body, half bent in front, swinging a little against the push."""
+    upper, lower, _ = pose.limb_bodies(model, "l_elbow")
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    swing = np.radians(3.0) * np.sin(phase)
+    down = np.column_stack([np.sin(0.12 + swing), np.full_like(phase, 0.24), -np.cos(0.12 + swing)])
+    inward = np.tile([0.35, -1.0, 0.0], (len(phase), 1))
+    own = pose.frame_of(zero[lower] - zero[upper], model.joint_axis("l_elbow"))
+    parent = pose.forward(model, joint_q)[:, model.body_parent[upper], 3:]
+    turn = Rotation.from_quat(parent).inv() * pose.frame_of(down, inward) * own.inv()
+    joint_q[:, model.q_slice("l_shoulder")] = turn.as_quat()
+    joint_q[:, model.q_slice("l_elbow")] = np.radians(50.0) + swing[:, None]
+
+
+def _right_arm(model, joint_q, palm: np.ndarray, tilt: np.ndarray) -> None:
+    """Palm (frames, 3) [m] down on the ball, fingers ahead and `tilt` (frames,) [rad] below the horizon."""
+    hand = model.body("r_hand")
+    shape = next(s for s in model.shapes if s.body == hand)
+    centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
+    yaw = np.radians(18.0)
+    fingers = np.column_stack(
+        [np.cos(yaw) * np.cos(tilt), np.sin(yaw) * np.cos(tilt), -np.sin(tilt)]
+    )
+    back = np.cross(fingers, [np.sin(yaw), -np.cos(yaw), 0.0])
+    back *= np.sign(back[:, 2:])
+    turn = pose.frame_of(fingers, back) * pose.frame_of([0.0, -1.0, 0.0], [0.0, 0.0, 1.0]).inv()
+    wrist = palm - turn.apply(centre)
+    elbow_axis = np.array([0.35, -0.80, 0.50])
+    _place(model, joint_q, "r_elbow", wrist, turn, elbow_axis)
+
+
+def _place(model, joint_q, hinge: str, end, end_turn: Rotation, axis) -> None:
+    """Solve a limb, in place: the body beyond the hinge's ends at `end` [m] with the world rotation `end_turn`."""
+    upper, lower, last = pose.limb_bodies(model, hinge)
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    limb = pose.Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
+    now = pose.forward(model, joint_q)
+    frames = len(joint_q)
+    end, axis = np.broadcast_to(end, (frames, 3)), np.tile(axis, (frames, 1))
+    turn, angle = limb.solve(now[:, upper, :3], end, axis)
+    parent = Rotation.from_quat(now[:, model.body_parent[upper], 3:])
+    joint_q[:, model.q_slice(pose.body_joint(model, upper))] = (parent.inv() * turn).as_quat()
+    joint_q[:, model.q_slice(hinge)] = angle[:, None]
+    beyond = turn * Rotation.from_rotvec(angle[:, None] * model.joint_axis(hinge))
+    joint_q[:, model.q_slice(pose.body_joint(model, last))] = (beyond.inv() * end_turn).as_quat()

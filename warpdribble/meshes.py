@@ -1,0 +1,104 @@
+"""Triangle meshes for the shapes of a model: what a viewer shows, since viewers do not draw analytic shapes alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+BOX_ROUNDING = 0.35
+"""Radius of a box's edges, as a share of its smallest half size."""
+SEAM_HALF_WIDTH = 0.035
+"""Half width of the seams of a ball, as a share of its radius."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    points: np.ndarray
+    """(points, 3) [m]."""
+    normals: np.ndarray
+    """(points, 3), outward, unit length."""
+    faces: np.ndarray
+    """(faces, 3) int, counter-clockwise seen from outside."""
+
+
+def shape_mesh(shape) -> Mesh:
+    """The surface of a sphere, capsule or box in the frame of its body.
+
+    shape: an object with kind, size, pos and quat as `sims.Model.shapes` has. Raises ValueError for other kinds.
+    """
+    if shape.kind == "sphere":
+        mesh = _sphere(shape.size[0])
+    elif shape.kind == "capsule":
+        mesh = _capsule(shape.size[0], shape.size[1])
+    elif shape.kind == "box":
+        mesh = _box(np.asarray(shape.size[:3], dtype=float))
+    else:
+        raise ValueError(f"shape '{shape.name}': no mesh for the kind '{shape.kind}'")
+    turn = Rotation.from_quat(shape.quat)
+    return Mesh(turn.apply(mesh.points) + shape.pos, turn.apply(mesh.normals), mesh.faces)
+
+
+def merge(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    starts = np.cumsum([0, *(len(m.points) for m in meshes[:-1])])
+    return Mesh(
+        np.concatenate([m.points for m in meshes]),
+        np.concatenate([m.normals for m in meshes]),
+        np.concatenate([m.faces + start for m, start in zip(meshes, starts)]),
+    )
+
+
+def faces_of(mesh: Mesh, chosen: np.ndarray) -> Mesh:
+    """The part of a mesh made of the chosen faces (faces,) bool."""
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    return Mesh(mesh.points[used], mesh.normals[used], faces.reshape(-1, 3))
+
+
+def ball_seams(mesh: Mesh) -> np.ndarray:
+    """Which faces (faces,) bool of a ball's mesh, centred on the origin, belong to the seams."""
+    centre = mesh.points[mesh.faces].mean(axis=1)
+    x, y, z = (centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
+    opening = np.radians(42.0) + np.radians(10.0) * np.cos(2.0 * np.arctan2(z, x))
+    curved = np.abs(np.arccos(np.abs(y)) - opening)
+    return np.minimum(np.minimum(np.abs(x), np.abs(z)), curved) < SEAM_HALF_WIDTH
+
+
+def _sphere(radius: float) -> Mesh:
+    sphere = trimesh.creation.icosphere(subdivisions=5 if radius > 0.1 else 3, radius=1.0)
+    points = np.asarray(sphere.vertices)
+    return Mesh(radius * points, points, np.asarray(sphere.faces))
+
+
+def _capsule(radius: float, half_length: float) -> Mesh:
+    count = [24, 13] if radius > 0.02 else [12, 7]
+    capsule = trimesh.creation.capsule(height=2.0 * half_length, radius=radius, count=count)
+    points = np.asarray(capsule.vertices)
+    axis = np.zeros_like(points)
+    axis[:, 2] = np.clip(points[:, 2], -half_length, half_length)
+    return Mesh(points, _unit(points - axis), np.asarray(capsule.faces))
+
+
+def _box(half: np.ndarray) -> Mesh:
+    """A box with rounded edges: the hull of eight balls."""
+    radius = BOX_ROUNDING * half.min()
+    inner = half - radius
+    steps = np.linspace(0.0, np.pi / 2.0, 5)
+    theta, phi = (a.ravel() for a in np.meshgrid(steps, steps))
+    octant = np.stack(
+        [np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=1
+    )
+    octant = np.unique(np.round(octant, 12), axis=0)
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    normals = np.concatenate([octant * s for s in signs])
+    points = np.concatenate([(octant * radius + inner) * s for s in signs])
+    hull = trimesh.Trimesh(points, process=False).convex_hull
+    points = np.asarray(hull.vertices)
+    normals = _unit(points - np.clip(points, -inner, inner))
+    return Mesh(points, normals, np.asarray(hull.faces))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
