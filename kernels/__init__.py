@@ -5,8 +5,8 @@ import sys
 from types import ModuleType
 
 
-def program(lanes: int) -> ModuleType:
-    """The module `step` compiled for `lanes` worlds in one `Real` (1, 4, 8 or 16).
+def program(lanes: int, module: str = "step") -> ModuleType:
+    """A kernel module compiled for `lanes` worlds in one `Real` (1, 4, 8 or 16).
 
     One source serves every lane count: the kernel modules are imported once more through a package
     that shares this folder and says how wide a `Real` is.
@@ -19,4 +19,4 @@ def program(lanes: int) -> ModuleType:
         package.__path__ = __path__
         package.LANES = lanes
         sys.modules[name] = package
-    return importlib.import_module(f"{name}.step")
+    return importlib.import_module(f"{name}.{module}")

@@ -8,7 +8,8 @@ normal and two tangents, are held side by side, as is everything here that comes
 
 import warp as wp
 
-from .collide import probe
+from .bounce import BOUNCE_SPEED, bounce
+from .collide import Touch, probe
 from .lanes import Real, add, any_lt, div, fill, least, most, mul, neg, root, size, sub, where_lt
 from .spatial import (
     Force,
@@ -34,8 +35,6 @@ MARGIN = wp.constant(0.002)
 """Slots that would come this near within the step take part [m]."""
 PUSH_LIMIT = wp.constant(2.0)
 """Overlap is taken back no faster than this [m/s]."""
-BOUNCE_SPEED = wp.constant(0.1)
-"""Slower impacts do not bounce [m/s]."""
 
 
 @wp.struct
@@ -189,47 +188,83 @@ def add_impulse(tree: Tree, world: World, g: int, slot: int, at: int, change: Ve
 
 
 @wp.func
-def find(tree: Tree, world: World, g: int):
-    """Which slots may touch within this step, what they want, and their responses."""
+def wish(tree: Tree, world: World, g: int, slot: int, gap: Real, u: Real, lively: Real) -> Real:
+    """Least normal velocity [m/s] to leave a slot with: what closes the gap, takes back some of an
+    overlap, or, where `lively` is positive, returns the approach velocity u with restitution."""
     h = tree.h
-    n = int(0)
-    at = int(0)
-    scratch = tree.response_room
+    pair = tree.slot_pair[slot]
+    zero = fill(0.0)
+    close = (-1.0 / h) * gap
+    goal = where_lt(zero, gap, close, least(tree.pair_erp[pair] * close, fill(PUSH_LIMIT)))
+    back = where_lt(u, fill(-BOUNCE_SPEED), neg(world.restitution[g, pair] * u), goal)
+    back = where_lt(gap + h * u, zero, back, goal)
+    return where_lt(zero, lively, most(goal, back), goal)
+
+
+@wp.func
+def enlist(tree: Tree, world: World, g: int, slot: int, touch: Touch, near: Real, goal: Real):
+    """Take a slot into the solve for the lanes where `near` is within the margin."""
+    last = 2 * tree.slot_count
+    n = world.active[g, last]
+    at = world.active[g, last + 1]
+    end = at + tree.slot_length[slot] + 2
+    if end > tree.response_room:
+        at = tree.response_room
+        end = world.active[g, last + 1]
+    margin = fill(MARGIN)
+    impulse = where_lt(near, margin, world.impulse[g, slot], zero3())
+    world.point[g, slot] = touch.point
+    world.normal[g, slot] = touch.normal
+    world.goal[g, slot] = where_lt(near, margin, goal, fill(NEVER))
+    world.impulse[g, slot] = impulse
+    world.active[g, 2 * n] = slot
+    world.active[g, 2 * n + 1] = at
+    world.active[g, last] = n + 1
+    world.active[g, last + 1] = end
+    respond(tree, world, g, slot, at)
+    add_impulse(tree, world, g, slot, at, impulse)
+
+
+@wp.func
+def find(tree: Tree, world: World, g: int):
+    """Which slots may touch within this step, what they want, and their responses. A ball in free
+    flight bounces here."""
+    margin = fill(MARGIN)
+    far = fill(1.0)
+    world.active[g, 2 * tree.slot_count] = 0
+    world.active[g, 2 * tree.slot_count + 1] = 0
+    for i in range(tree.flight_count):
+        world.touched[g, tree.flight_link[i]] = far
     for slot in range(tree.slot_count):
+        if tree.slot_flight[slot] == 0:
+            touch = probe(tree, world, g, slot)
+            u = approach(tree, world, g, slot, touch.point, touch.normal)
+            near = least(touch.gap, touch.gap + tree.h * u)
+            world.gap[g, slot] = touch.gap
+            if any_lt(near, margin):
+                a = tree.slot_link_a[slot]
+                b = tree.slot_link_b[slot]
+                world.touched[g, a] = least(world.touched[g, a], near)
+                world.touched[g, b] = least(world.touched[g, b], near)
+                goal = wish(tree, world, g, slot, touch.gap, u, far)
+                enlist(tree, world, g, slot, touch, near, goal)
+            else:
+                world.impulse[g, slot] = zero3()
+    for f in range(tree.flight_count):
+        i = tree.flight_link[f]
+        slot = tree.flight_slot[f]
         touch = probe(tree, world, g, slot)
         u = approach(tree, world, g, slot, touch.point, touch.normal)
-        reach = touch.gap + h * u
-        near = least(touch.gap, reach)
-        margin = fill(MARGIN)
-        never = fill(NEVER)
+        near = least(touch.gap, touch.gap + tree.h * u)
+        free = world.touched[g, i] - margin
         world.gap[g, slot] = touch.gap
+        world.knock[g, i] = fill(0.0)
         if any_lt(near, margin):
-            world.point[g, slot] = touch.point
-            world.normal[g, slot] = touch.normal
-            pair = tree.slot_pair[slot]
-            zero = fill(0.0)
-            erp = fill(tree.pair_erp[pair])
-            goal = (-1.0 / h) * where_lt(zero, touch.gap, touch.gap, erp * touch.gap)
-            goal = least(goal, fill(PUSH_LIMIT))
-            back = neg(world.restitution[g, pair] * u)
-            back = where_lt(u, fill(-BOUNCE_SPEED), where_lt(reach, zero, back, never), never)
-            goal = where_lt(near, margin, most(goal, back), never)
-            world.goal[g, slot] = goal
-            place = at
-            if at + tree.slot_length[slot] + 2 > scratch:
-                place = scratch
-            else:
-                at = at + tree.slot_length[slot] + 2
-            world.active[g, 2 * n] = slot
-            world.active[g, 2 * n + 1] = place
-            n = n + 1
-            respond(tree, world, g, slot, place)
-            impulse = where_lt(near, margin, world.impulse[g, slot], zero3())
-            world.impulse[g, slot] = impulse
-            add_impulse(tree, world, g, slot, place, impulse)
+            hits = bounce(tree, world, g, i, slot, touch, free)
+            near = where_lt(fill(0.0), hits, far, near)
+            enlist(tree, world, g, slot, touch, near, wish(tree, world, g, slot, touch.gap, u, neg(free)))
         else:
             world.impulse[g, slot] = zero3()
-    world.active[g, 2 * tree.slot_count] = n
 
 
 @wp.func
@@ -278,3 +313,14 @@ def solve(tree: Tree, world: World, g: int):
             if at == tree.response_room:
                 respond(tree, world, g, slot, at)
             relax(tree, world, g, slot, at)
+    zero = fill(0.0)
+    one = fill(1.0)
+    for k in range(count):
+        slot = world.active[g, 2 * k]
+        flag = tree.slot_flag[slot]
+        if flag != 0:
+            push = world.impulse[g, slot].x
+            if flag == 1:
+                world.fallen[g, 0] = where_lt(zero, push, one, world.fallen[g, 0])
+            else:
+                world.fumbled[g, 0] = where_lt(zero, push, one, world.fumbled[g, 0])

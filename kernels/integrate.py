@@ -3,7 +3,7 @@
 import warp as wp
 
 from .kinematics import load3, load4, store3
-from .lanes import Real, add, fill, mul
+from .lanes import Real, add, fill, mul, where_lt
 from .spatial import Quat, Vec3, add, exponential, mul, normalize
 from .tree import BALL, FREE, Tree, World
 
@@ -31,3 +31,17 @@ def integrate(tree: Tree, world: World, g: int):
             turn_joint(world, g, iq, load3(world.qd, g, iv), h)
         else:
             world.q[g, iq] = world.q[g, iq] + h * world.qd[g, iv]
+    check(tree, world, g)
+
+
+@wp.func
+def check(tree: Tree, world: World, g: int):
+    """Flag worlds whose state has stopped being finite; a comparison with a NaN is false."""
+    total = fill(0.0)
+    for k in range(tree.q_count):
+        x = world.q[g, k]
+        total = total + x * x
+    for k in range(tree.dof_count):
+        v = world.qd[g, k]
+        total = total + v * v
+    world.broken[g, 0] = where_lt(total, fill(1.0e12), world.broken[g, 0], fill(1.0))

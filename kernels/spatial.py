@@ -17,6 +17,7 @@ Algorithms* (2008).
 import warp as wp
 
 from .lanes import (
+    LANES,
     Real,
     add,
     div,
@@ -132,6 +133,13 @@ def sub(a: Vec3, b: Vec3) -> Vec3:  # noqa: F811
 @wp.func
 def mul(k: Real, a: Vec3) -> Vec3:  # noqa: F811
     return Vec3(k * a.x, k * a.y, k * a.z)
+
+
+if LANES > 1:
+
+    @wp.func
+    def mul(k: float, a: Vec3) -> Vec3:  # noqa: F811
+        return Vec3(k * a.x, k * a.y, k * a.z)
 
 
 @wp.func

@@ -9,8 +9,9 @@ from .articulated import factorize, velocities
 from .contact import find, solve
 from .integrate import integrate
 from .kinematics import inertias, kinematics
-from .lanes import LANES, Real
-from .tree import Tree, World  # noqa: F401 (also read by sims)
+from .lanes import Real  # noqa: F401
+from .spatial import Motion  # noqa: F401
+from .tree import Tree, World
 
 wp.set_module_options(
     {

@@ -36,6 +36,7 @@ class Tree:
     q_count: int
     dof_count: int
     slot_count: int
+    flight_count: int
     response_room: int
     """responses that `World.y` holds; what does not fit is worked out anew in each sweep"""
     sweeps: int
@@ -116,8 +117,10 @@ class Tree:
     slot_dof: wp.array(dtype=int)
     """the first of them in response_dof"""
     response_dof: wp.array(dtype=int)
-    link_flight: wp.array(dtype=int)
-    """the slot in which a free ball meets the ground, its flight solved exactly; else -1"""
+    slot_flight: wp.array(dtype=int)
+    """1: a free ball and the ground, its flight solved exactly (see `bounce`)"""
+    flight_link: wp.array(dtype=int)
+    flight_slot: wp.array(dtype=int)
     pair_erp: wp.array(dtype=float)
     pair_cfm: wp.array(dtype=float)
 
@@ -162,9 +165,12 @@ class World:
     y: wp.array2d(dtype=Vec3)
     """responses of the slots in use: two entries for the slot's own matrix, then one per dof"""
     active: wp.array2d(dtype=int)
-    """slots in use by some lane of the group, each followed by its place in y; their number is last"""
+    """slots in use by some lane of the group, each followed by its place in y; last, their number and
+    the end of y"""
     touched: wp.array2d(dtype=Real)
-    """for each link with a flight, the least distance to anything but the ground [m]"""
+    """least distance of a link that bounces to anything but the ground [m]"""
+    knock: wp.array2d(dtype=Real)
+    """impulse of its bounce in this step [N s]"""
 
     broken: wp.array2d(dtype=Real)
     fallen: wp.array2d(dtype=Real)

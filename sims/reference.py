@@ -42,11 +42,11 @@ class Cycle:
 
     reference: Reference
     """The closed cycle; its last row begins the next."""
-    turn: float
+    turn: float = 0.0
     """[rad] about the vertical per cycle."""
-    travel: np.ndarray
+    travel: tuple[float, float] = (0.0, 0.0)
     """(2,) [m] of the root over the ground per cycle, seen from the cycle's first root position."""
-    gap: float
+    gap: float = 0.0
     """[rad] root mean square over the model's joints of what had to be closed."""
 
     def repeat(self, model, count: int) -> Reference:
@@ -65,7 +65,7 @@ class Cycle:
         anchor = self.reference.joint_q[0, root][:2]
         place = np.zeros(2)
         for i in range(number):
-            place = place + _plane(i * self.turn) @ self.travel
+            place = place + _plane(i * self.turn) @ np.asarray(self.travel)
         joint_q = joint_q.copy()
         joint_q[:, root] = _over_ground(
             joint_q[:, root], anchor, anchor + place, number * self.turn
@@ -73,7 +73,7 @@ class Cycle:
         return joint_q
 
 
-def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=np.radians(20.0)):
+def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35) -> Cycle:
     """Make the last row of a reference meet its first, spreading what is missing evenly over the rows.
 
     The way over the ground is kept as the cycle's travel and turn when the root ends more than `travel_above` [m] or
@@ -94,7 +94,7 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=np.ra
     share = np.linspace(0.0, 1.0, reference.frame_count)[:, None]
     closed = integrate(model, reference.joint_q, share * missing)
     size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
-    return Cycle(replace(reference, joint_q=closed), turn, travel, float(size))
+    return Cycle(replace(reference, joint_q=closed), turn, tuple(travel.tolist()), float(size))
 
 
 def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,26 @@ RESPONSE_ROOM = 1365
 
 SWEEPS = 10
 """Sweeps of the contact solver a step; docs/contact.md shows the residual this leaves."""
+
+
+NONFINITE, FALL, BAD_CONTACT = 1, 2, 4
+"""Bits of `Simulation.status`."""
+
+
+@dataclass
+class Contacts:
+    """Slots in which two shapes may touch, for all worlds."""
+
+    shapes: list[tuple[str, str]]
+    """(slots) names; impulses push the second along the normal"""
+    gap: np.ndarray
+    """(world_count, slots) [m], negative: overlap"""
+    point: np.ndarray
+    """(world_count, slots, 3) half way between the surfaces [m]"""
+    normal: np.ndarray
+    """(world_count, slots, 3) from the first shape to the second"""
+    impulse: np.ndarray
+    """(world_count, slots, 3) of the last step, along the normal and two tangents [N s]"""
 
 
 def widest_lanes() -> int:
@@ -61,6 +82,7 @@ class Simulation:
         if not on_cpu and self.lanes != 1:
             raise ValueError("lanes are for the CPU; on CUDA leave them out")
         self._program = kernels.program(self.lanes)
+        self._observer = kernels.program(self.lanes, "observe")
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
@@ -86,6 +108,7 @@ class Simulation:
         tree.link_count = len(model.tables["link_parent"]) - 1
         tree.q_count, tree.dof_count = model.nq, model.nv
         tree.slot_count = len(model.tables.get("slot_kind", ()))
+        tree.flight_count = len(model.tables.get("flight_link", ()))
         tree.sweeps = sweeps
         tree.forced = 0
         lengths = model.tables.get("slot_length", np.zeros(0, int))
@@ -100,7 +123,7 @@ class Simulation:
         counts = dict.fromkeys(("q", "target"), model.nq)
         counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
         counts |= dict.fromkeys(
-            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "touched"), links
+            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "touched", "knock"), links
         )
         counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
         counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
@@ -108,7 +131,7 @@ class Simulation:
         counts |= {
             "force": model.nbody,
             "y": tree.response_room + longest,
-            "active": 2 * tree.slot_count + 1,
+            "active": 2 * tree.slot_count + 2,
         }
         world = program.World()
         for name, var in program.World.vars.items():
@@ -133,56 +156,39 @@ class Simulation:
         self._write("turn", everyone, ground, column=0)
         self._write("R", everyone, np.eye(3, dtype=np.float32).ravel(), column=0)
 
-    def _rows(self, name: str) -> np.ndarray:
-        """A state array as float32 `(groups, n, parts, lanes)`; on a CPU a view, on CUDA a copy."""
-        array = getattr(self._world, name)
-        if self.device.is_cpu:
-            rows = array.numpy()
-        else:
-            rows = np.ascontiguousarray(array.transpose().numpy().swapaxes(0, 1))
+    def _rows(self, array: wp.array) -> np.ndarray:
+        """An array as float32 `(groups, n, parts, lanes)`; on a CPU a view, on CUDA a copy."""
+        rows = array.numpy()
         rows = rows.view(np.float32) if rows.dtype.fields else rows
         return rows.reshape(self.groups, array.shape[1], -1, self.lanes)
 
-    def _read(self, name: str, first: int = 0, count: int | None = None) -> np.ndarray:
-        """`(world_count, n, parts)` of a state array, parts dropped where there is one."""
-        rows = self._rows(name)
-        rows = rows[:, first : None if count is None else first + count]
+    def _read(self, array: wp.array, count: int | None = None) -> np.ndarray:
+        """`(world_count, count, parts)` of an array, parts dropped where there is one."""
+        rows = self._rows(array)[:, :count]
         rows = rows.transpose(0, 3, 1, 2).reshape(-1, *rows.shape[1:3])[: self.world_count]
-        return rows[..., 0].copy() if rows.shape[-1] == 1 else rows.copy()
+        return rows[..., 0] if rows.shape[-1] == 1 else rows
 
     def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
-        """Set a state array of some worlds; `values` `(n)` or `(len(worlds), n)`, parts flattened. World
-        numbers beyond world_count fill up the last group and follow the last world."""
-        rows = self._rows(name)
-        values = np.asarray(values, np.float32)
-        values = values.reshape(*values.shape[:1], -1) if values.ndim > 1 else values
-        n, parts = rows.shape[1:3]
-        if column is not None:
-            n = 1
-        values = np.broadcast_to(values.reshape(-1, n, parts), (len(worlds), n, parts))
-        last = self.world_count - 1
-        if self.groups * self.lanes > self.world_count and len(worlds) and worlds[-1] == last:
+        """Set a state array of some worlds, or one column of it: `values` `(..., n * parts)`, for each
+        world or for all. The unused worlds of the last group follow the last world."""
+        array = getattr(self._world, name)
+        rows = self._rows(array)
+        columns = slice(None) if column is None else slice(column, column + 1)
+        n, parts = rows[:, columns].shape[1:3]
+        values = np.asarray(values, np.float32).reshape(-1, n, parts)
+        values = np.broadcast_to(values, (len(worlds), n, parts))
+        if len(worlds) and worlds[-1] == self.world_count - 1:
             spare = np.arange(self.world_count, self.groups * self.lanes)
             worlds = np.concatenate([worlds, spare])
             values = np.concatenate([values, np.repeat(values[-1:], len(spare), 0)])
         group, lane = np.divmod(worlds, self.lanes)
-        where = slice(None) if column is None else slice(column, column + 1)
-        if column is None:
-            rows[group, :, :, lane] = values
-        else:
-            rows[group, column, :, lane] = values[:, 0]
-        del where
+        part = rows[:, columns]
+        part[group, :, :, lane] = values
         if not self.device.is_cpu:
-            array = getattr(self._world, name)
-            flat = np.ascontiguousarray(rows[..., 0].swapaxes(0, 1)).reshape(-1)
-            source = wp.array(
-                flat.view(array.transpose().numpy().dtype).reshape(array.shape[::-1])
-                if flat.size
-                else flat,
-                dtype=array.dtype,
-                device=self.device,
-            )
-            wp.copy(array.transpose(), source)
+            rows[:, columns] = part
+            host = np.ascontiguousarray(rows[..., 0])
+            dtype = array.dtype.numpy_dtype() if hasattr(array.dtype, "numpy_dtype") else np.float32
+            array.assign(host.view(dtype).reshape(array.shape))
 
     # ------------------------------------------------------------------------------------ control
 
@@ -236,7 +242,7 @@ class Simulation:
             self._write("target", worlds, q)
         for name in ("broken", "fallen", "fumbled"):
             self._write(name, worlds, np.zeros(1))
-        self._write("impulse", worlds, np.zeros(self._rows("impulse").shape[1] * 3))
+        self._write("impulse", worlds, np.zeros(self._world.impulse.shape[1] * 3))
 
     def set_targets(self, joint_target_q) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
@@ -288,15 +294,19 @@ class Simulation:
         self.launch("step", count)
 
     def launch(self, kernel: str, count: int = 1) -> None:
-        """Run a kernel of `kernels.step`, or a part of a step by its name, `count` times."""
-        function = getattr(self._program, kernel)
+        """Run a kernel of `kernels.step`, the whole step or a part of it, `count` times."""
+        self._run(self._program, kernel, [count])
+
+    def _run(self, program, kernel: str, inputs: list) -> None:
+        """Launch over all groups, a slice of them per thread."""
+        function = getattr(program, kernel)
         size = -(-self.groups // self.threads)
 
         def run(first: int) -> None:
             wp.launch(
                 function,
                 dim=min(size, self.groups - first),
-                inputs=[self._tree, self._world, first, count],
+                inputs=[self._tree, self._world, first, *inputs],
                 device=self.device,
             )
 
@@ -305,7 +315,7 @@ class Simulation:
             for first in starts:
                 run(first)
         else:
-            self._program.load(self.device)
+            program.load(self.device)
             list(self._pool.map(run, starts))
 
     # ------------------------------------------------------------------------------- observations
@@ -313,9 +323,133 @@ class Simulation:
     @property
     def joint_q(self) -> np.ndarray:
         """(world_count, nq) [m, rad, -]"""
-        return self._read("q", 0, self.model.nq)
+        return self._read(self._world.q)
 
     @property
     def joint_qd(self) -> np.ndarray:
         """(world_count, nv) [m/s, rad/s]"""
-        return self._read("qd", 0, self.model.nv)
+        return self._read(self._world.qd)
+
+    def _bodies(self) -> tuple[np.ndarray, np.ndarray]:
+        n = self.model.nbody
+        pose = self._allocate(7 * n, self._program.Real)
+        velocity = self._allocate(6 * n, self._program.Real)
+        self._run(self._observer, "bodies", [pose, velocity])
+        shape = (self.world_count, n, -1)
+        return self._read(pose).reshape(shape), self._read(velocity).reshape(shape)
+
+    @property
+    def body_q(self) -> np.ndarray:
+        """(world_count, nbody, 7): position [m] and quaternion xyzw of each body's frame"""
+        return self._bodies()[0]
+
+    @property
+    def body_qd(self) -> np.ndarray:
+        """(world_count, nbody, 6): velocity of each body's centre of mass [m/s], angular velocity [rad/s],
+        along the world's axes"""
+        return self._bodies()[1]
+
+    @property
+    def status(self) -> np.ndarray:
+        """(world_count,) bit mask since the last reset: `NONFINITE`, `FALL` (a part of the player other
+        than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand)"""
+        flags = (NONFINITE, "broken"), (FALL, "fallen"), (BAD_CONTACT, "fumbled")
+        return sum(
+            bit * (self._read(getattr(self._world, name))[:, 0] > 0).astype(np.int32)
+            for bit, name in flags
+        )
+
+    def contacts(self) -> Contacts:
+        """Every slot of every world: its gap now, and the impulse of the last step."""
+        self._run(self._observer, "gaps", [])
+        model, world = self.model, self._world
+        count = self._tree.slot_count
+        impulse = self._read(world.impulse, count).reshape(self.world_count, -1, 3)[:, :count].copy()
+        knock = self._read(world.knock)
+        for link, slot in zip(
+            model.tables.get("flight_link", ()), model.tables.get("flight_slot", ()), strict=True
+        ):
+            impulse[:, slot, 0] += knock[:, link]
+        pairs = model.tables.get("slot_pair", np.zeros(0, int))
+        shapes = [model.pairs[pair]["shapes"] for pair in pairs]
+        return Contacts(
+            shapes=[(model.shapes[a].name, model.shapes[b].name) for a, b in shapes],
+            gap=self._read(world.gap, count)[:, :count],
+            point=self._read(world.point, count).reshape(self.world_count, -1, 3)[:, :count],
+            normal=self._read(world.normal, count).reshape(self.world_count, -1, 3)[:, :count],
+            impulse=impulse,
+        )
+
+    def mass_matrix(self) -> np.ndarray:
+        """(world_count, nv, nv) joint-space inertia, armature included [kg, kg m, kg m^2]"""
+        M = self._allocate(self.model.nv**2, self._program.Real)
+        self._run(self._observer, "mass_matrix", [M])
+        return self._read(M).reshape(self.world_count, self.model.nv, self.model.nv)
+
+    def bias_force(self) -> np.ndarray:
+        """(world_count, nv) Coriolis, centrifugal and gravity force, as they stand on the left of
+        M qdd + bias = f [N, N m]; applied external forces count in"""
+        A = self._allocate(self._tree.link_count + 1, self._program.Motion)
+        C = self._allocate(self.model.nv, self._program.Real)
+        self._run(self._observer, "bias_force", [A, C])
+        return self._read(C)
+
+    # ------------------------------------------------------------------------- parameters by world
+
+    def set_contact(
+        self,
+        a: str,
+        b: str,
+        restitution: float | np.ndarray | None = None,
+        friction: float | np.ndarray | None = None,
+        worlds=None,
+    ) -> None:
+        """Set the restitution and friction [-] of every contact between two shapes or bodies, in some
+        worlds; a number, or one per world. Raises ValueError where a and b cannot touch."""
+        worlds = self._worlds(worlds)
+        names = self._shape_groups()
+        for name in (a, b):
+            if name not in names:
+                raise ValueError(f"no shape or body named {name!r}")
+        found = [
+            k
+            for k, pair in enumerate(self.model.pairs)
+            for x, y in (pair["shapes"], pair["shapes"][::-1])
+            if x in names[a] and y in names[b]
+        ]
+        if not found:
+            raise ValueError(f"{a!r} and {b!r} never touch in this model")
+        for name, value in (("restitution", restitution), ("friction", friction)):
+            if value is None:
+                continue
+            value = np.asarray(value, np.float32)
+            if not np.isfinite(value).all() or (value < 0).any():
+                raise ValueError(f"{name} must not be negative")
+            for k in found:
+                self._write(name, worlds, value.reshape(-1, 1), column=k)
+
+    def _shape_groups(self) -> dict[str, set[int]]:
+        groups: dict[str, set[int]] = {}
+        for k, shape in enumerate(self.model.shapes):
+            groups.setdefault(shape.name, set()).add(k)
+            body = "world" if shape.body < 0 else self.model.body_names[shape.body]
+            groups.setdefault(body, set()).add(k)
+        return groups
+
+    def set_mass(self, body: str, mass: float | np.ndarray, worlds=None) -> None:
+        """Set a body's mass [kg] in some worlds, its inertia in proportion; a number, or one per world."""
+        worlds = self._worlds(worlds)
+        b = self.model.body(body)
+        link = int(self.model.tables["body_link"][b])
+        if link == 0 or (self.model.tables["body_link"] == link).sum() > 1:
+            raise ValueError(f"body {body!r} is fixed to another: its mass cannot be set alone")
+        mass = np.asarray(mass, np.float32)
+        if not np.isfinite(mass).all() or (mass <= 0).any():
+            raise ValueError("mass must be positive")
+        self._write("mass_scale", worlds, (mass / self.model.body_mass[b]).reshape(-1, 1), column=link)
+
+    @property
+    def memory_per_world(self) -> float:
+        """Bytes of state a world takes."""
+        arrays = (getattr(self._world, name) for name in self._program.World.vars)
+        return sum(a.capacity for a in arrays) / (self.groups * self.lanes)

@@ -101,7 +101,7 @@ def drop_shared(points, link: int, place, shapes: list[Shape], chains: Chains):
 
 
 def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
-    """Arrays `slot_*`, `response_dof`, `shape_*`, `link_flight` for the kernels; `geoms[k]` is the geom of shape k."""
+    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels; `geoms[k]` is the geom of shape k."""
     chains = Chains(tables)
     place = [
         (
@@ -112,7 +112,7 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
         for s in shapes
     ]
     rows, pairs, responses = [], [], []
-    flight = np.full(len(tables.link_parent), -1)
+    flights = []
 
     def add(kind, a, b, plane=(0, 0, 1, 0), point=(0, 0, 0), radius=0.0):
         link_a = 0 if kind == POINT_PLANE else int(place[a][0])
@@ -152,12 +152,14 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
             link_b, offset, turn = place[b]
             n = (place[a][2] * Rotation.from_quat(shapes[a].quat)).apply([0, 0, 1])
             at = place[a][1] + place[a][2].apply(shapes[a].pos)
-            lone = links["count"][link_b] == 1 and chains.joint[link_b] == FREE
+            # one ground at a time: a ball over two planes bounces by the solver's rule
+            grounds = sum(s.kind == "plane" for s in shapes)
+            lone = grounds == 1 and links["count"][link_b] == 1 and chains.joint[link_b] == FREE
             points = [(offset + turn.apply(p), radius) for p, radius in touch_points(shapes[b])]
             for point, radius in drop_shared(points, link_b, place, shapes, chains):
                 centred = np.allclose(point, links["com"][link_b], atol=1e-9)
                 if kinds[1] == "sphere" and lone and centred:
-                    flight[link_b] = len(rows)
+                    flights.append((link_b, len(rows)))
                 add(POINT_PLANE, a, b, (*n, n @ at), point, radius)
         elif kinds[1] == "sphere":
             add(SPHERE_BOX if kinds[0] == "box" else SPHERE_CAPSULE, a, b)
@@ -171,7 +173,8 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
         )
     table = {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
     table["pairs"] = pairs
-    table["link_flight"] = flight
+    table["flight_link"], table["flight_slot"] = np.array(flights, int).reshape(-1, 2).T
+    table["slot_flight"] = np.isin(np.arange(len(rows)), table["flight_slot"]).astype(int)
     table["response_dof"] = np.array([dof for dofs in responses for dof in dofs], int)
     table |= shape_tables(shapes, place)
     return table

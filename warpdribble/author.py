@@ -43,7 +43,7 @@ class Dribble:
     """Below the horizon."""
     feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
     """Left and right ankle: forward, left, turned out."""
-    curl: float = 0.35
+    curl: float = 0.2
     """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
     fingers: tuple[float, float] = (14.0, 38.0)
     """Tilt of the fingers below the horizon, at the top of the stroke and after the release."""

@@ -1,0 +1,161 @@
+"""What a simulation shows of itself: bodies, contacts, the mass matrix and the bias force.
+
+These kernels recompute what they need from joint_q and joint_qd, so they hold for the present state
+whatever a step has left behind.
+"""
+
+import warp as wp
+
+from .collide import probe
+from .kinematics import drift, inertias, kinematics
+from .lanes import Real, add, fill, mul
+from .spatial import (
+    Motion,
+    Vec3,
+    add,
+    column,
+    cross,
+    dot,
+    mul,
+    quat,
+    rotate,
+    shift_force,
+    shift_inertia,
+    unit3,
+)
+from .tree import BALL, FREE, GROUND, HINGE, Tree, World
+
+wp.set_module_options(
+    {"enable_backward": False, "max_unroll": 3, "cpu_compiler_flags": "-march=native -ffp-contract=fast"}
+)
+
+
+def load(device) -> None:
+    """Compile the kernels now; to be done before threads launch them."""
+    wp.load_module(__name__, device=device)
+
+
+@wp.kernel
+def bodies(
+    tree: Tree, world: World, first: int, pose: wp.array2d(dtype=Real), velocity: wp.array2d(dtype=Real)
+):
+    """pose: 7 per body, position [m] and quaternion xyzw of its frame; velocity: 6 per body, of its
+    centre of mass [m/s] and angular [rad/s], along the world's axes."""
+    g = first + wp.tid()
+    kinematics(tree, world, g)
+    for b in range(tree.body_link.shape[0]):
+        i = tree.body_link[b]
+        R = world.R[g, i]
+        V = world.V[g, i]
+        x = world.pos[g, i] + rotate(R, tree.body_offset[b])
+        q = world.turn[g, i] * quat(tree.body_turn[b])
+        v = V.v + cross(V.w, rotate(R, tree.body_com[b]))
+        pose[g, 7 * b] = x.x
+        pose[g, 7 * b + 1] = x.y
+        pose[g, 7 * b + 2] = x.z
+        pose[g, 7 * b + 3] = q.x
+        pose[g, 7 * b + 4] = q.y
+        pose[g, 7 * b + 5] = q.z
+        pose[g, 7 * b + 6] = q.w
+        velocity[g, 6 * b] = v.x
+        velocity[g, 6 * b + 1] = v.y
+        velocity[g, 6 * b + 2] = v.z
+        velocity[g, 6 * b + 3] = V.w.x
+        velocity[g, 6 * b + 4] = V.w.y
+        velocity[g, 6 * b + 5] = V.w.z
+
+
+@wp.kernel
+def gaps(tree: Tree, world: World, first: int):
+    """Gap, point and normal of every slot."""
+    g = first + wp.tid()
+    kinematics(tree, world, g)
+    for slot in range(tree.slot_count):
+        touch = probe(tree, world, g, slot)
+        world.gap[g, slot] = touch.gap
+        world.point[g, slot] = touch.point
+        world.normal[g, slot] = touch.normal
+
+
+@wp.func
+def axis(tree: Tree, world: World, g: int, i: int, k: int) -> Motion:
+    """Motion axis of dof k of a link's joint."""
+    R = world.R[g, i]
+    zero = Vec3(fill(0.0), fill(0.0), fill(0.0))
+    joint = tree.link_joint[i]
+    if joint == HINGE:
+        return Motion(rotate(R, tree.link_axis[i]), zero)
+    if joint == BALL:
+        return Motion(column(R, k), zero)
+    if k < 3:
+        return Motion(zero, unit3(k))
+    return Motion(column(R, k - 3), zero)
+
+
+@wp.func
+def dofs(tree: Tree, i: int) -> int:
+    joint = tree.link_joint[i]
+    if joint == HINGE:
+        return 1
+    if joint == BALL:
+        return 3
+    return 6
+
+
+@wp.kernel
+def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real)):
+    """Joint-space inertia with armature, dof_count^2 numbers a world, by composite rigid bodies
+    (RBDA table 6.2)."""
+    g = first + wp.tid()
+    n = tree.dof_count
+    kinematics(tree, world, g)
+    inertias(tree, world, g)
+    for c in range(n * n):
+        M[g, c] = fill(0.0)
+    for c in range(tree.link_count):
+        i = tree.link_count - c
+        parent = tree.link_parent[i]
+        I = world.I[g, i]  # noqa: E741
+        if parent != GROUND:
+            world.I[g, parent] = world.I[g, parent] + shift_inertia(I, world.r[g, i])
+        for k in range(dofs(tree, i)):
+            j = tree.link_dof[i] + k
+            F = I * axis(tree, world, g, i, k)
+            a = int(i)
+            while a != GROUND:
+                for m in range(dofs(tree, a)):
+                    other = tree.link_dof[a] + m
+                    value = dot(axis(tree, world, g, a, m), F)
+                    if other <= j:
+                        M[g, n * j + other] = value
+                        M[g, n * other + j] = value
+                F = shift_force(F, world.r[g, a])
+                a = tree.link_parent[a]
+            M[g, n * j + j] = M[g, n * j + j] + tree.dof_armature[j]
+
+
+@wp.kernel
+def bias_force(
+    tree: Tree, world: World, first: int, A: wp.array2d(dtype=Motion), C: wp.array2d(dtype=Real)
+):
+    """Generalised force that holds the present velocity: Coriolis, centrifugal and gravity, by recursive
+    Newton-Euler with no joint acceleration (RBDA table 5.1). External forces
+    count in. A: scratch, zero, an entry per link."""
+    g = first + wp.tid()
+    kinematics(tree, world, g)
+    inertias(tree, world, g)
+    for i in range(1, tree.link_count + 1):
+        parent = tree.link_parent[i]
+        above = A[g, parent]  # the ground's stays zero
+        own = drift(world, g, i, parent)
+        a = Motion(above.w + own.w, above.v + cross(above.w, world.r[g, i]) + own.v)
+        A[g, i] = a
+        world.p[g, i] = world.p[g, i] + world.I[g, i] * a
+    for c in range(tree.link_count):
+        i = tree.link_count - c
+        p = world.p[g, i]
+        for k in range(dofs(tree, i)):
+            C[g, tree.link_dof[i] + k] = dot(axis(tree, world, g, i, k), p)
+        parent = tree.link_parent[i]
+        if parent != GROUND:
+            world.p[g, parent] = world.p[g, parent] + shift_force(p, world.r[g, i])
