@@ -268,12 +268,12 @@ def find(tree: Tree, world: World, g: int):
 
 
 @wp.func
-def relax(tree: Tree, world: World, g: int, slot: int, at: int):
-    """One Gauss-Seidel visit of a slot: the normal impulse, then friction on the disc that it allows."""
+def visit(tree: Tree, world: World, g: int, slot: int, at: int) -> Vec3:
+    """The impulse that suits a slot as things stand: along the normal, then friction on the disc that
+    this allows."""
     first = tree.slot_dof[slot]
-    length = tree.slot_length[slot]
     u = zero3()
-    for k in range(length):
+    for k in range(tree.slot_length[slot]):
         u = u + world.w[g, tree.response_dof[first + k]] * world.y[g, at + 2 + k]
     a = world.y[g, at]
     b = world.y[g, at + 1]
@@ -282,21 +282,37 @@ def relax(tree: Tree, world: World, g: int, slot: int, at: int):
     soft = tree.pair_cfm[pair] / tree.h
     n = most(fill(0.0), old.x - (u.x + soft * old.x - world.goal[g, slot]) / (a.x + soft))
     dn = n - old.x
-    # friction: a step as long as the stiffer tangent allows, back onto the disc
-    ut = u.y + a.y * dn
-    uu = u.z + a.z * dn
-    half = 0.5 * (b.x + b.z)
+    # a step as long as the stiffer tangent allows, and back onto the disc
+    pace = 1.0 / most(stiffer(b), fill(1.0e-12))
+    t = old.y - pace * (u.y + a.y * dn)
+    s = old.z - pace * (u.z + a.z * dn)
+    grip = world.friction[g, pair] * n
+    pull = t * t + s * s
+    back = where_lt(grip * grip, pull, grip / root(most(pull, fill(1.0e-24))), fill(1.0))
+    return Vec3(n, back * t, back * s)
+
+
+@wp.func
+def stiffer(b: Vec3) -> Real:
+    """The larger eigenvalue of the two tangents' matrix [[x, y], [y, z]]."""
     skew = 0.5 * (b.x - b.z)
-    stiff = half + root(skew * skew + b.y * b.y)
-    step = 1.0 / most(stiff, fill(1.0e-12))
-    t = old.y - step * ut
-    s = old.z - step * uu
-    length2 = t * t + s * s
-    limit = world.friction[g, pair] * n
-    back = where_lt(limit * limit, length2, limit / root(most(length2, fill(1.0e-24))), fill(1.0))
-    new = Vec3(n, back * t, back * s)
-    world.impulse[g, slot] = new
-    add_impulse(tree, world, g, slot, at, new - old)
+    return 0.5 * (b.x + b.z) + root(skew * skew + b.y * b.y)
+
+
+@wp.func
+def residual(tree: Tree, world: World, g: int) -> Real:
+    """Largest velocity [m/s] that one more visit would take from any slot."""
+    worst = fill(0.0)
+    for k in range(world.active[g, 2 * tree.slot_count]):
+        slot = world.active[g, 2 * k]
+        at = world.active[g, 2 * k + 1]
+        if at == tree.response_room:
+            respond(tree, world, g, slot, at)
+        change = visit(tree, world, g, slot, at) - world.impulse[g, slot]
+        pull = root(change.y * change.y + change.z * change.z)
+        worst = most(worst, world.y[g, at].x * size(change.x))
+        worst = most(worst, stiffer(world.y[g, at + 1]) * pull)
+    return worst
 
 
 @wp.func
@@ -312,7 +328,9 @@ def solve(tree: Tree, world: World, g: int):
             at = world.active[g, 2 * c + 1]
             if at == tree.response_room:
                 respond(tree, world, g, slot, at)
-            relax(tree, world, g, slot, at)
+            impulse = visit(tree, world, g, slot, at)
+            add_impulse(tree, world, g, slot, at, impulse - world.impulse[g, slot])
+            world.impulse[g, slot] = impulse
     zero = fill(0.0)
     one = fill(1.0)
     for k in range(count):

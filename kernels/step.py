@@ -6,7 +6,7 @@
 import warp as wp
 
 from .articulated import factorize, velocities
-from .contact import find, solve
+from .contact import find, residual, solve
 from .integrate import integrate
 from .kinematics import inertias, kinematics
 from .lanes import Real  # noqa: F401
@@ -86,3 +86,9 @@ def run_solve(tree: Tree, world: World, first: int, count: int):
     g = first + wp.tid()
     for _k in range(count):
         solve(tree, world, g)
+
+
+@wp.kernel
+def run_residual(tree: Tree, world: World, first: int, out: wp.array2d(dtype=Real)):
+    g = first + wp.tid()
+    out[g, 0] = residual(tree, world, g)

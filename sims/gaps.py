@@ -1,4 +1,5 @@
-"""How far shapes are from the ground and from a ball, from recorded body frames alone: an outside view of contact."""
+"""How far shapes are from the ground and from a ball, from recorded body frames alone: an
+outside view of contact."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 
 def lowest_point(model, body_q: np.ndarray, bodies) -> np.ndarray:
-    """Height (frames,) [m] of the lowest point of the shapes of `bodies` (indices), body_q (frames, nbody, 7)."""
+    """Height (frames,) [m] of the lowest point of the shapes of `bodies` (indices), body_q
+    (frames, nbody, 7)."""
     heights = []
     for shape in (s for s in model.shapes if s.body in set(bodies) and s.kind != "plane"):
         centre, turn = _place(shape, body_q)
@@ -23,7 +25,8 @@ def lowest_point(model, body_q: np.ndarray, bodies) -> np.ndarray:
 
 
 def gap_to_bodies(model, body_q: np.ndarray, bodies, points: np.ndarray) -> np.ndarray:
-    """Distance (frames,) [m] from points (frames, 3) to the nearest surface of the shapes of `bodies` (indices)."""
+    """Distance (frames,) [m] from points (frames, 3) to the nearest surface of the shapes of
+    `bodies` (indices)."""
     distances = []
     for shape in (s for s in model.shapes if s.body in set(bodies) and s.kind != "plane"):
         centre, turn = _place(shape, body_q)

@@ -192,7 +192,10 @@ def load_mjcf(path: Path, name: str) -> Model:
             for s in range(m.nsite)
         },
         keyframes={},
-        texts={m.text(k).name: m.text(k).data.tobytes().decode().rstrip("\0") for k in range(m.ntext)},
+        texts={
+            _string(m.names, m.name_textadr[k]): _string(m.text_data, m.text_adr[k])
+            for k in range(m.ntext)
+        },
         start_q=np.zeros(m.nq),
         tables=tables,
         pairs=pairs,
@@ -205,6 +208,12 @@ def load_mjcf(path: Path, name: str) -> Model:
     tables["body_com"] = bodies["body_offset"][1:] + _rotate(bodies["body_turn"][1:], m.body_ipos[1:])
     tables["slot_flag"] = _flags(model)
     return model
+
+
+def _string(data: bytes, start: int) -> str:
+    """The zero-terminated string at `start` of one of MuJoCo's buffers."""
+    data = bytes(data)
+    return data[start : data.index(b"\0", start)].decode()
 
 
 def _order(model: Model, qpos: np.ndarray) -> np.ndarray:

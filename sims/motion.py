@@ -1,7 +1,8 @@
 """A recorded motion as data: a tree of joints, their rotations over time, and where the root goes.
 
-World frame: metres, Z up, ground near z = 0; the rest pose faces +X with the left side toward +Y, as the player does.
-Quaternions are xyzw. End sites of the recording are joints without motion, named `<parent>_end`.
+World frame: metres, Z up, ground near z = 0; the rest pose faces +X with the left side toward +Y,
+as the player does. Quaternions are xyzw. End sites of the recording are joints without motion,
+named `<parent>_end`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Motion:
     rate: float
     """[Hz]."""
     rest_rotations: np.ndarray
-    """(joints, 4) [-], xyzw, the T-pose that calibrates retargeting (identity where none was recorded)."""
+    """(joints, 4) [-], xyzw, the T-pose that calibrates retargeting (identity where none was
+    recorded)."""
 
     def __post_init__(self):
         joints, frames = len(self.joint_names), len(self.root_position)
@@ -74,19 +76,17 @@ class Motion:
                 f"frames {first} to {last} are not a range within 0 to {self.frame_count - 1}"
             )
         part = slice(first, last + 1)
-        return replace(
-            self, rotations=self.rotations[part], root_position=self.root_position[part]
-        )
+        return replace(self, rotations=self.rotations[part], root_position=self.root_position[part])
 
     def resample(self, rate: float) -> Motion:
         """The same motion at another rate [Hz].
 
-        Rotations move along geodesics between the recorded frames, the root along straight lines. The last frame
-        is kept to within half a new frame.
+        Rotations move along geodesics between the recorded frames, the root along straight lines.
+        The last frame is kept to within half a new frame.
         """
         if rate <= 0:
             raise ValueError(f"a rate must be positive, not {rate}")
-        count = int(round(self.duration * rate)) + 1
+        count = round(self.duration * rate) + 1
         at = np.linspace(0.0, self.frame_count - 1.0, count) if count > 1 else np.zeros(1)
         return replace(
             self,
@@ -96,7 +96,8 @@ class Motion:
         )
 
     def forward(self) -> tuple[np.ndarray, np.ndarray]:
-        """Forward kinematics: joint origins (frames, joints, 3) [m] and joint frames (frames, joints, 4) xyzw."""
+        """Forward kinematics: joint origins (frames, joints, 3) [m] and joint frames (frames,
+        joints, 4) xyzw."""
         return _forward(self.parents, self.offsets, self.rotations, self.root_position)
 
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +128,8 @@ def interpolate_lines(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def interpolate_rotations(quaternions: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Geodesic interpolation of quaternions (frames, ..., 4) xyzw at fractional frame numbers `at` (n,)."""
+    """Geodesic interpolation of quaternions (frames, ..., 4) xyzw at fractional frame numbers
+    `at` (n,)."""
     low, share = _bracket(len(quaternions), at)
     high = np.minimum(low + 1, len(quaternions) - 1)
     shape = (len(at), *quaternions.shape[1:])

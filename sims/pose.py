@@ -1,4 +1,5 @@
-"""Where a model's bodies are for given joint coordinates, on plain NumPy: what making motion needs, off the simulator."""
+"""Where a model's bodies are for given joint coordinates, on plain NumPy: what making motion
+needs, off the simulator."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ from .model import JOINT_TYPES
 
 
 def forward(model, joint_q: np.ndarray) -> np.ndarray:
-    """Body frames (frames, nbody, 7) [m, -], position and quaternion xyzw, for joint_q (frames, nq)."""
+    """Body frames (frames, nbody, 7) [m, -], position and quaternion xyzw, for joint_q (frames,
+    nq)."""
     joint_q = np.atleast_2d(np.asarray(joint_q, dtype=float))
     t, frames = model.tables, len(joint_q)
     places, turns = [np.zeros((frames, 3))], [Rotation.identity(frames)]
@@ -44,7 +46,8 @@ def joint_body(model, joint: str) -> int:
 
 
 def body_joint(model, body: int) -> str:
-    """The one joint that moves a body against its parent. Raises ValueError when there are none or several."""
+    """The one joint that moves a body against its parent. Raises ValueError when there are none
+    or several."""
     names = [n for n in model.joint_names if joint_body(model, n) == body]
     if len(names) != 1:
         raise ValueError(f"body '{model.body_names[body]}' has {len(names)} joints, not one")
@@ -52,7 +55,8 @@ def body_joint(model, body: int) -> str:
 
 
 def zero_q(model) -> np.ndarray:
-    """Joint coordinates (nq,) of the zero pose: free joints where the file puts them, every angle zero."""
+    """Joint coordinates (nq,) of the zero pose: free joints where the file puts them, every
+    angle zero."""
     joint_q, t = np.zeros(model.nq), model.tables
     for name in model.joint_names:
         place, link = model.q_slice(name), model.joint_link[model.joint(name)]
@@ -73,7 +77,8 @@ def twist(turn: Rotation, axis: np.ndarray) -> np.ndarray:
 
 
 def frame_of(direction: np.ndarray, toward: np.ndarray) -> Rotation:
-    """The frame (n,) whose first axis is `direction` (n, 3) and whose second lies nearest `toward` (n, 3)."""
+    """The frame (n,) whose first axis is `direction` (n, 3) and whose second lies nearest
+    `toward` (n, 3)."""
     first = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
     second = toward - np.sum(toward * first, axis=-1, keepdims=True) * first
     second = second / np.linalg.norm(second, axis=-1, keepdims=True)
@@ -104,7 +109,8 @@ class Limb:
     """(3,), the hinge's axis; it bends the limb at positive angles."""
 
     def bend_for(self, distance: np.ndarray) -> np.ndarray:
-        """Hinge angle (n,) [rad] at which the end is `distance` (n,) [m] from the ball joint; clipped to reach.
+        """Hinge angle (n,) [rad] at which the end is `distance` (n,) [m] from the ball joint;
+        clipped to reach.
 
         |upper + R(axis, t) lower|^2 = distance^2 is A cos t + B sin t + C = const.
         """
@@ -118,9 +124,11 @@ class Limb:
         return np.arctan2(b, a) + np.arccos(np.clip(wanted / reach, -1.0, 1.0))
 
     def solve(self, start: np.ndarray, end: np.ndarray, hinge: np.ndarray):
-        """World rotation (n,) of the upper segment and hinge angle (n,) [rad] that put the end joint at `end`.
+        """World rotation (n,) of the upper segment and hinge angle (n,) [rad] that put the end
+        joint at `end`.
 
-        start, end: (n, 3) [m] in the world; hinge: (n, 3), where the hinge's axis should point in the world.
+        start, end: (n, 3) [m] in the world; hinge: (n, 3), where the hinge's axis should point in
+        the world.
         """
         reach = end - start
         angle = self.bend_for(np.linalg.norm(reach, axis=-1))

@@ -29,7 +29,8 @@ class Reference:
         return (self.frame_count - 1) * self.timestep
 
     def velocity(self, model) -> np.ndarray:
-        """joint_qd (frames, nv) [m/s, rad/s] by differences to the next row (the last row keeps its own)."""
+        """joint_qd (frames, nv) [m/s, rad/s] by differences to the next row (the last row keeps
+        its own)."""
         if self.frame_count < 2:
             return np.zeros((self.frame_count, model.nv))
         steps = difference(model, self.joint_q[:-1], self.joint_q[1:]) / self.timestep
@@ -50,7 +51,8 @@ class Cycle:
     """[rad] root mean square over the model's joints of what had to be closed."""
 
     def repeat(self, model, count: int) -> Reference:
-        """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count < 1."""
+        """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count
+        < 1."""
         if count < 1:
             raise ValueError(f"a cycle is repeated at least once, not {count} times")
         body = self.reference.joint_q[:-1]
@@ -74,11 +76,13 @@ class Cycle:
 
 
 def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35) -> Cycle:
-    """Make the last row of a reference meet its first, spreading what is missing evenly over the rows.
+    """Make the last row of a reference meet its first, spreading what is missing evenly over the
+    rows.
 
-    The way over the ground is kept as the cycle's travel and turn when the root ends more than `travel_above` [m] or
-    `turn_above` [rad] from where it began; a smaller one is drift of somebody who stays in place, and is closed too.
-    P1 7.1 blends at the ends only; spreading adds no velocity step. Returns a Cycle.
+    The way over the ground is kept as the cycle's travel and turn when the root ends more than
+    `travel_above` [m] or `turn_above` [rad] from where it began; a smaller one is drift of somebody
+    who stays in place, and is closed too. P1 7.1 blends at the ends only; spreading adds no
+    velocity step. Returns a Cycle.
     """
     root = model.q_slice(root_joint(model))
     first, last = reference.joint_q[0], reference.joint_q[-1]
@@ -98,7 +102,8 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
 
 
 def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Rows of joint_q (frames, nq) at fractional frame numbers `at` (n,): geodesics for rotations, lines for the rest."""
+    """Rows of joint_q (frames, nq) at fractional frame numbers `at` (n,): geodesics for
+    rotations, lines for the rest."""
     out = interpolate_lines(joint_q, at)
     for start in model.quaternions():
         place = slice(start, start + 4)
@@ -107,7 +112,8 @@ def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def difference(model, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The motion (..., nv) that carries joint coordinates `start` (..., nq) to `end` in unit time."""
+    """The motion (..., nv) that carries joint coordinates `start` (..., nq) to `end` in unit
+    time."""
     out = np.zeros((*start.shape[:-1], model.nv))
     for name in model.joint_names:
         q, dof = model.q_slice(name), model.dof_slice(name)
@@ -123,7 +129,8 @@ def difference(model, start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def integrate(model, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Joint coordinates (..., nq) reached from `start` by `motion` (..., nv) in unit time; undoes `difference`."""
+    """Joint coordinates (..., nq) reached from `start` by `motion` (..., nv) in unit time;
+    undoes `difference`."""
     out = np.array(start, dtype=float)
     for name in model.joint_names:
         q, dof = model.q_slice(name), model.dof_slice(name)
@@ -168,7 +175,8 @@ def _plane(angle: float) -> np.ndarray:
 
 
 def _over_ground(poses, pivot, place, turn: float) -> np.ndarray:
-    """Root poses (frames, 7) turned about the vertical through `pivot` (2,), which then lies at `place` (2,)."""
+    """Root poses (frames, 7) turned about the vertical through `pivot` (2,), which then lies at
+    `place` (2,)."""
     poses = np.array(poses, dtype=float)
     poses[:, :2] = (poses[:, :2] - pivot) @ _plane(turn).T + place
     by = Rotation.from_rotvec([0.0, 0.0, turn])

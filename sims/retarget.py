@@ -1,9 +1,9 @@
 """From a recorded skeleton to a model: rotations of corresponding joints are copied (P1 7.1).
 
-What is copied is how far each segment has turned from the T-pose, seen in the world, so that joints between the named
-ones are composed on the way and the two skeletons' joint frames need not agree. Where a segment has a direction (an
-upper arm, a thigh), the T-poses are matched by that direction; where the next joint is a hinge, by the hinge's axis
-too, which the recording shows by how it bends.
+What is copied is how far each segment has turned from the T-pose, seen in the world, so that joints
+between the named ones are composed on the way and the two skeletons' joint frames need not agree.
+Where a segment has a direction (an upper arm, a thigh), the T-poses are matched by that direction;
+where the next joint is a hinge, by the hinge's axis too, which the recording shows by how it bends.
 """
 
 from __future__ import annotations
@@ -29,11 +29,14 @@ class Mapping:
     bodies: dict[str, str]
     """Body of the model -> joint of the recording whose frame it follows."""
     limbs: dict[str, tuple[str, str, str]]
-    """Hinge of the model -> joints of the recording at the near end, the hinge and the far end of the limb."""
+    """Hinge of the model -> joints of the recording at the near end, the hinge and the far end
+    of the limb."""
     legs: tuple[tuple[str, str, str, str], ...]
     """(hip body, foot body, hip joint, foot joint) of each leg: they set the scale."""
     soles: tuple[str, ...]
     """Bodies of the model whose shapes stand on the ground."""
+    in_line: tuple[str, ...] = ()
+    """Ends of limbs that continue the limb's line in the T-pose: hands, not feet."""
     smoothed: dict[str, float] = field(default_factory=dict)
     """Body -> cut-off [Hz] of a low-pass filter, for joints the recording shows with noise."""
 
@@ -73,16 +76,19 @@ CMU = Mapping(
         ("r_upper_leg", "r_foot", "RightUpLeg", "RightFoot"),
     ),
     soles=("l_foot", "l_toes", "r_foot", "r_toes"),
+    in_line=("l_hand", "r_hand"),
     smoothed={"l_hand": 8.0, "r_hand": 8.0},
 )
-"""CMU's BVH skeleton onto the player. Toes stay straight: they are the noisiest joints of these recordings."""
+"""CMU's BVH skeleton onto the player. Toes stay straight: they are the noisiest joints of these
+recordings."""
 
 
 def retarget(model, motion: Motion, mapping: Mapping = CMU) -> Reference:
     """The motion on the model, at the model's time step, feet on z = 0.
 
-    Bodies the mapping does not name keep the angles of the model's start pose (fingers, the ball). The motion is
-    resampled to a whole number of steps. Raises ValueError for a joint or body that is not there.
+    Bodies the mapping does not name keep the angles of the model's start pose (fingers, the ball).
+    The motion is resampled to a whole number of steps. Raises ValueError for a joint or body that
+    is not there.
     """
     motion = motion.resample(1.0 / model.timestep)
     turned = _body_rotations(model, motion, mapping)
@@ -97,14 +103,18 @@ def retarget(model, motion: Motion, mapping: Mapping = CMU) -> Reference:
 def ground_height(model, joint_q: np.ndarray, soles, share: float = 0.2) -> float:
     """[m] height that the lowest sole point stays above in all but `share` of the frames.
 
-    Somebody stands or pushes off most of the time, so this is the ground the feet were on, within their noise.
+    Somebody stands or pushes off most of the time, so this is the ground the feet were on, within
+    their noise.
     """
     body_q = pose.forward(model, joint_q)
-    return float(np.quantile(gaps.lowest_point(model, body_q, [_body(model, name) for name in soles]), share))
+    return float(
+        np.quantile(gaps.lowest_point(model, body_q, [_body(model, name) for name in soles]), share)
+    )
 
 
 def _body_rotations(model, motion: Motion, mapping: Mapping) -> dict[str, Rotation]:
-    """World rotation of each mapped body of the model: turn of the recorded joint since the T-pose, times the match."""
+    """World rotation of each mapped body of the model: turn of the recorded joint since the
+    T-pose, times the match."""
     _, frames = motion.forward()
     rest_at, rest = motion.rest()
 
@@ -123,7 +133,8 @@ def _body_rotations(model, motion: Motion, mapping: Mapping) -> dict[str, Rotati
 
 
 def _match_limbs(model, motion, mapping, since_rest, rest_at) -> dict[str, Rotation]:
-    """For the segments of each limb: what turns the model's zero pose into the recording's T-pose."""
+    """For the segments of each limb: what turns the model's zero pose into the recording's
+    T-pose."""
     match = {}
     zero = pose.forward(model, pose.zero_q(model))[0]
     for hinge, (near, middle, far) in mapping.limbs.items():
@@ -138,15 +149,16 @@ def _match_limbs(model, motion, mapping, since_rest, rest_at) -> dict[str, Rotat
         else:
             guess = _shortest(own, theirs).apply(axis)
             shown = shown if shown @ guess > 0.0 else -shown
-            matched = (pose.frame_of(theirs, shown) * pose.frame_of(own, axis).inv())
-        for body in (upper, lower, end):
-            match[model.body_names[body]] = matched
-        match[model.body_names[end]] = _shortest(own, theirs)
+            matched = pose.frame_of(theirs, shown) * pose.frame_of(own, axis).inv()
+        match[model.body_names[upper]] = match[model.body_names[lower]] = matched
+        if model.body_names[end] in mapping.in_line:
+            match[model.body_names[end]] = _shortest(own, theirs)
     return match
 
 
 def _common_axis(bends: np.ndarray) -> np.ndarray | None:
-    """The axis (3,) that rotation vectors (frames, 3) share, or None when they are too small to tell."""
+    """The axis (3,) that rotation vectors (frames, 3) share, or None when they are too small to
+    tell."""
     if np.linalg.norm(bends, axis=1).max() < STRAIGHT:
         return None
     return np.linalg.eigh(bends.T @ bends)[1][:, -1]
@@ -162,9 +174,11 @@ def _shortest(start: np.ndarray, end: np.ndarray) -> Rotation:
 
 
 def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> None:
-    """Joint coordinates of the bodies in `turned`, in place; hinges take the angle nearest to the copied rotation.
+    """Joint coordinates of the bodies in `turned`, in place; hinges take the angle nearest to the
+    copied rotation.
 
-    A joint's own rotation is what brings its body, now at the zero angle, to the wanted world rotation.
+    A joint's own rotation is what brings its body, now at the zero angle, to the wanted world
+    rotation.
     """
     zero = pose.zero_q(model)
     for body, name in enumerate(model.body_names):
@@ -182,7 +196,8 @@ def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> Non
 
 
 def _root(model, motion: Motion, mapping: Mapping, turned) -> np.ndarray:
-    """Root poses (frames, 7): the middle of the hips follows the recording's, scaled by leg length."""
+    """Root poses (frames, 7): the middle of the hips follows the recording's, scaled by leg
+    length."""
     zero = pose.forward(model, pose.zero_q(model))[0]
     rest_at, _ = motion.rest()
     own = theirs = 0.0

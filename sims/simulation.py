@@ -380,6 +380,12 @@ class Simulation:
             impulse=impulse,
         )
 
+    def contact_residual(self) -> np.ndarray:
+        """(world_count,) largest velocity [m/s] by which a contact of the last step misses its law"""
+        out = self._allocate(1, self._program.Real)
+        self._run(self._program, "run_residual", [out])
+        return self._read(out)[:, 0]
+
     def mass_matrix(self) -> np.ndarray:
         """(world_count, nv, nv) joint-space inertia, armature included [kg, kg m, kg m^2]"""
         M = self._allocate(self.model.nv**2, self._program.Real)

@@ -1,8 +1,10 @@
-"""A dribble written down instead of recorded: standing, right hand, in place, cyclic, the same every time.
+"""A dribble written down instead of recorded: standing, right hand, in place, cyclic, the same
+every time.
 
-The ball comes first: it falls from the hand, bounces by the law of restitution, meets the hand again, and is carried up
-and pushed down so that it leaves as it did a cycle before. The hand stays on the ball while it has it. The rest of the
-body stands, leans, looks ahead and gives a little with every push; arms and legs are solved for hands and feet.
+The ball comes first: it falls from the hand, bounces by the law of restitution, meets the hand
+again, and is carried up and pushed down so that it leaves as it did a cycle before. The hand stays
+on the ball while it has it. The rest of the body stands, leans, looks ahead and gives a little with
+every push; arms and legs are solved for hands and feet.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Dribble:
-    """Numbers of the authored dribble. Lengths in metres, times in seconds, angles in degrees, speeds in m/s."""
+    """Numbers of the authored dribble. Lengths in metres, times in seconds, angles in degrees,
+    speeds in m/s."""
 
     period: float = 0.72
     release_height: float = 0.775
@@ -57,14 +60,16 @@ class AuthoredClip:
     hand: str
     """Body that dribbles."""
     contact: tuple[float, float]
-    """[s] from the first row: the hand catches and releases the ball. The clip begins at a release."""
+    """[s] from the first row: the hand catches and releases the ball. The clip begins at a
+    release."""
     lowest: float
     """[s] from the first row: the hand is lowest."""
     restitution: float
 
 
 def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
-    """The authored right-hand dribble on the player, at its time step; the ball's path is in its coordinates.
+    """The authored right-hand dribble on the player, at its time step; the ball's path is in its
+    coordinates.
 
     Raises ValueError when the numbers ask for a ball that does not come back to the hand.
     """
@@ -94,9 +99,11 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
 
 
 def ball_flight(height: float, speed: float, restitution: float, radius: float):
-    """Down, bounce and up again to the same height: time down [s], time up [s], speed back at that height [m/s].
+    """Down, bounce and up again to the same height: time down [s], time up [s], speed back at that
+    height [m/s].
 
-    height: of the centre [m] where it starts with `speed` [m/s] downward. Raises ValueError if it does not come back.
+    height: of the centre [m] where it starts with `speed` [m/s] downward. Raises ValueError if it
+    does not come back.
     """
     fall = height - radius
     impact = np.sqrt(speed**2 + 2.0 * GRAVITY * fall)
@@ -110,7 +117,8 @@ def ball_flight(height: float, speed: float, restitution: float, radius: float):
 
 
 def _stroke(style: Dribble, period: float, radius: float):
-    """Duration of the flight, and heights of ball and palm as functions of the time since the release."""
+    """Duration of the flight, and heights of ball and palm as functions of the time since the
+    release."""
     down, up, back = ball_flight(
         style.release_height, style.release_speed, style.restitution, radius
     )
@@ -190,7 +198,8 @@ def _left_arm(model, joint_q, phase) -> None:
 
 
 def _right_arm(model, joint_q, palm: np.ndarray, tilt: np.ndarray) -> None:
-    """Palm (frames, 3) [m] down on the ball, fingers ahead and `tilt` (frames,) [rad] below the horizon."""
+    """Palm (frames, 3) [m] down on the ball, fingers ahead and `tilt` (frames,) [rad] below the
+    horizon."""
     hand = model.body("r_hand")
     shape = next(s for s in model.shapes if s.body == hand)
     centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
@@ -207,7 +216,8 @@ def _right_arm(model, joint_q, palm: np.ndarray, tilt: np.ndarray) -> None:
 
 
 def _place(model, joint_q, hinge: str, end, end_turn: Rotation, axis) -> None:
-    """Solve a limb, in place: the body beyond the hinge's ends at `end` [m] with the world rotation `end_turn`."""
+    """Solve a limb, in place: the body beyond the hinge's ends at `end` [m] with the world
+    rotation `end_turn`."""
     upper, lower, last = pose.limb_bodies(model, hinge)
     zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
     limb = pose.Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))

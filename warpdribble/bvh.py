@@ -1,7 +1,7 @@
 """BVH files in: read strictly, brought to metres and Z up, known defects repaired and said.
 
-The CMU conversion of 2010 (cgspeed.com) needs three things beyond the format: its length unit, the added T-pose in
-the first row, and the lengths of its branching bones, which the conversion lost.
+The CMU conversion of 2010 (cgspeed.com) needs three things beyond the format: its length unit, the
+added T-pose in the first row, and the lengths of its branching bones, which the conversion lost.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class ClipError(ValueError):
 def read_bvh(path: str | Path) -> tuple[Motion, list[str]]:
     """Read a BVH file as a Motion in metres, Z up, and notes on what was detected or repaired.
 
-    Frames count from 0; where the file begins with an added T-pose row, that row becomes the rest pose and frame 0
-    is the row after it. Raises ClipError when the file is missing, is not BVH, is cut short, or holds values that
-    are no motion.
+    Frames count from 0; where the file begins with an added T-pose row, that row becomes the rest
+    pose and frame 0 is the row after it. Raises ClipError when the file is missing, is not BVH, is
+    cut short, or holds values that are no motion.
     """
     path = Path(path)
     clip = _parse(path)
@@ -90,10 +90,12 @@ def read_bvh(path: str | Path) -> tuple[Motion, list[str]]:
 
 
 def repair_cmu_offsets(names: list[str], offsets: np.ndarray) -> list[str]:
-    """Give the branching bones of the CMU conversion their lengths back, in place; the names of those repaired.
+    """Give the branching bones of the CMU conversion their lengths back, in place; the names of
+    those repaired.
 
-    offsets: (joints, 3) in any unit. Only offsets that are exactly zero are touched. The wrist bone is half the
-    radius (exact in the skeletons compared), the thorax continues the spine (within 3.5 mm).
+    offsets: (joints, 3) in any unit. Only offsets that are exactly zero are touched. The wrist bone
+    is half the radius (exact in the skeletons compared), the thorax continues the spine (within 3.5
+    mm).
     """
     lost = {}
     for hand, fingers in CMU_WRISTS.items():
@@ -122,7 +124,9 @@ def _parse(path: Path) -> pybvh.Bvh:
     except UnicodeDecodeError:
         raise ClipError(path, "not a BVH file (binary data)") from None
     except Exception as error:
-        reason = " ".join(str(error).replace(f"in file {path}", "").replace(f"in {path}", "").split())
+        reason = " ".join(
+            str(error).replace(f"in file {path}", "").replace(f"in {path}", "").split()
+        )
         raise ClipError(path, f"broken BVH: {reason or type(error).__name__}") from None
 
 
@@ -150,7 +154,8 @@ def _unit(path, names, parents, offsets) -> tuple[float, str]:
 
 
 def _is_added_pose(angles: np.ndarray) -> bool:
-    """Whether row 0 of angles (frames, joints, 3) [rad] was typed in, not recorded: root unturned, whole degrees."""
+    """Whether row 0 of angles (frames, joints, 3) [rad] was typed in, not recorded: root
+    unturned, whole degrees."""
     degrees = np.degrees(angles[0])
     return (
         len(angles) > 1

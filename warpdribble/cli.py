@@ -124,6 +124,9 @@ def _bench(arguments: list[str]) -> int:
 def _run(command: Simulate | Demo) -> int:
     if command.repeat < 1:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
+    import warp
+
+    warp.config.quiet = True
     from .sims import Model
     from .take import check_writable
 
@@ -228,10 +231,8 @@ def say(line: str) -> None:
 
 def _ready(model, worlds: int, device: str):
     """A simulation that has compiled what it needs; the wait is shown."""
-    import warp
     from rich.console import Console
 
-    warp.config.quiet = True
     from .sims import Simulation
 
     waiting = "compiling kernels (once; about a minute the first time, then cached) ..."

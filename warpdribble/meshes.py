@@ -1,4 +1,5 @@
-"""Triangle meshes for the shapes of a model: what a viewer shows, since viewers do not draw analytic shapes alike."""
+"""Triangle meshes for the shapes of a model: what a viewer shows, since viewers do not draw
+analytic shapes alike."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ class Mesh:
 def shape_mesh(shape) -> Mesh:
     """The surface of a sphere, capsule or box in the frame of its body.
 
-    shape: an object with kind, size, pos and quat as `sims.Model.shapes` has. Raises ValueError for other kinds.
+    shape: an object with kind, size, pos and quat as `sims.Model.shapes` has. Raises ValueError for
+    other kinds.
     """
     if shape.kind == "sphere":
         mesh = _sphere(shape.size[0])

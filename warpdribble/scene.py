@@ -24,7 +24,9 @@ def material(stage, colour) -> UsdShade.Material:
     surface = UsdShade.Material.Define(stage, path)
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*map(float, colour)))
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(
+        Gf.Vec3f(*map(float, colour))
+    )
     shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.6)
     shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
     surface.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
@@ -32,7 +34,8 @@ def material(stage, colour) -> UsdShade.Material:
 
 
 def add_mesh(stage, path: str, mesh: Mesh, colour) -> UsdGeom.Mesh:
-    """A mesh prim with normals, extent, displayColor and a bound material. colour: 3 numbers in 0 to 1."""
+    """A mesh prim with normals, extent, displayColor and a bound material. colour: 3 numbers in
+    0 to 1."""
     prim = UsdGeom.Mesh.Define(stage, path)
     points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.points, dtype=np.float32))
     prim.CreatePointsAttr(points)
@@ -98,10 +101,9 @@ def _sheet(low, high, height: float) -> Mesh:
 def _lines() -> Mesh:
     """The border, the half-way line and the centre circle of a court centred on the origin."""
     x, y, w = *COURT_HALF, 0.5 * LINE_WIDTH
-    strips = [
-        ((-x - w, s * y - w), (x + w, s * y + w)) for s in (-1, 1)
-    ] + [((c - w, -y + w), (c + w, y - w)) for c in (-x, 0.0, x)]
-    sheets = [_sheet(low, high, -0.002) for low, high in strips]
+    along = [((-x - w, side - w), (x + w, side + w)) for side in (-y, y)]
+    across = [((c - w, -y + w), (c + w, y - w)) for c in (-x, 0.0, x)]
+    sheets = [_sheet(low, high, -0.002) for low, high in (*along, *across)]
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:-1]
     ring = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     points = np.concatenate([(1.8 - w) * ring, (1.8 + w) * ring]) + [0.0, 0.0, -0.001]

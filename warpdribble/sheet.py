@@ -1,4 +1,5 @@
-"""A contact sheet: what a take looks like at a glance, poses above and heights and contacts below."""
+"""A contact sheet: what a take looks like at a glance, poses above and heights and contacts
+below."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def write_sheet(
 ) -> Path:
     """Draw a take as PNG; the file appears whole or not at all. Raises TakeError.
 
-    hands: name -> height (frames,) [m], drawn beside the ball's; contacts: name -> (frames,) bool, one strip each.
+    hands: name -> height (frames,) [m], drawn beside the ball's; contacts: name -> (frames,) bool,
+    one strip each.
     """
     path = check_writable(path, (".png",))
     figure = Figure(figsize=(14.0, 7.2), dpi=110, facecolor="white", layout="constrained")
@@ -90,7 +92,8 @@ def _draw_poses(axes, take: Take, frames, times) -> None:
 
 
 def _outline(shape, body_q, screen, middle):
-    """Depth, outline (points (n, 2) or (centre, radius)) and colour of a shape as the viewer sees it."""
+    """Depth, outline (points (n, 2) or (centre, radius)) and colour of a shape as the viewer
+    sees it."""
     body = Rotation.from_quat(body_q[shape.body, 3:])
     turn = body * Rotation.from_quat(shape.quat)
     centre = body_q[shape.body, :3] + body.apply(shape.pos) - middle
@@ -109,9 +112,11 @@ def _outline(shape, body_q, screen, middle):
 
 
 def _patch(outline, shift: float):
+    aside = np.array([shift, 0.0])
     if isinstance(outline, tuple):
-        return Circle(outline[0] + [shift, 0.0], outline[1])
-    return Polygon(outline + [shift, 0.0])
+        centre, radius = outline
+        return Circle(centre + aside, radius)
+    return Polygon(outline + aside)
 
 
 def _draw_heights(axes, take: Take, hands, times, frames) -> None:

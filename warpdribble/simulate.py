@@ -1,4 +1,5 @@
-"""The main job: a clip becomes a reference, a simulated player follows it, and what happened is measured."""
+"""The main job: a clip becomes a reference, a simulated player follows it, and what happened is
+measured."""
 
 from __future__ import annotations
 
@@ -17,8 +18,9 @@ from .sims.reference import Cycle, Reference, close_cycle, difference, integrate
 from .sims.retarget import CMU, retarget
 
 ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
-"""Virtual gains of a tracked root: [N/m], [N s/m], [N m/rad], [N m s/rad]. The rates are a tenth of the
-stiffnesses, as with the player's joints, so that one lead in time makes up for all their damping."""
+"""Virtual gains of a tracked root: [N/m], [N s/m], [N m/rad], [N m s/rad]. The rates are a tenth
+of the stiffnesses, as with the player's joints, so that one lead in time makes up for all their
+damping."""
 FALLEN = 0.6
 """A player has fallen when its root is lower than this share of the reference's height."""
 LIGHT = 0.1
@@ -26,7 +28,8 @@ LIGHT = 0.1
 TOUCH = 0.006
 """[m] A gap below this counts as contact in pictures and summaries."""
 TRIES = 16
-"""Starts of the ball that are simulated side by side; a vector unit steps as many worlds in the time of one."""
+"""Starts of the ball that are simulated side by side; a vector unit steps as many worlds in the
+time of one."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ def load_clip(model, path: str | Path, frames=(0, -1)) -> tuple[Cycle, list[str]
 
 
 def dribbling_hand(model, reference: Reference) -> str:
-    """"r_hand" or "l_hand", whichever moves more up and down."""
+    """ "r_hand" or "l_hand", whichever moves more up and down."""
     heights = pose.forward(model, reference.joint_q)[:, :, 2]
     hands = {name: np.ptp(heights[:, model.body(name)]) for name in ("r_hand", "l_hand")}
     return max(hands, key=hands.get)
@@ -106,8 +109,8 @@ def dribbling_hand(model, reference: Reference) -> str:
 def ball_from_hand(model, reference: Reference, hand: str) -> BallStart:
     """A ball that touches the palm from below at the first row.
 
-    With the hand in the upper half of its stroke the ball moves with it, and is the hand's to push; below, it has
-    left the hand, downward and at least fast enough to come back to this height.
+    With the hand in the upper half of its stroke the ball moves with it, and is the hand's to push;
+    below, it has left the hand, downward and at least fast enough to come back to this height.
     """
     body, ball = model.body(hand), model.body("ball")
     body_q = pose.forward(model, reference.joint_q)
@@ -140,11 +143,13 @@ def simulate(
     ball: BallStart | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Run:
-    """Track a reference in every world of `sim`; the run of the world whose ball stays in play longest.
+    """Track a reference in every world of `sim`; the run of the world whose ball stays in play
+    longest.
 
-    World 0 starts with the ball as given, the others with small, fixed variations of it. Targets lead the reference
-    by damping/stiffness of each joint, since a drive damps the velocity that the reference asks for. progress: called
-    with the number of steps done. Raises FloatingPointError when the state becomes non-finite.
+    World 0 starts with the ball as given, the others with small, fixed variations of it. Targets
+    lead the reference by damping/stiffness of each joint, since a drive damps the velocity that the
+    reference asks for. progress: called with the number of steps done. Raises FloatingPointError
+    when the state becomes non-finite.
     """
     model = sim.model
     worlds = sim.world_count
@@ -190,7 +195,8 @@ def _put_ball(model, joint_q, joint_qd, ball: BallStart) -> None:
 
 
 def _leading_targets(model, reference: Reference) -> np.ndarray:
-    """Targets (frames, nq): the reference, ahead by kd/kp [s] of each degree of freedom along its velocity."""
+    """Targets (frames, nq): the reference, ahead by kd/kp [s] of each degree of freedom along
+    its velocity."""
     kp, kd = (np.array(model.tables[name], dtype=float) for name in ("dof_kp", "dof_kd"))
     lead = np.divide(kd, kp, out=np.zeros_like(kd), where=kp > 0.0)
     root = model.dof_slice(root_joint(model))
@@ -199,7 +205,8 @@ def _leading_targets(model, reference: Reference) -> np.ndarray:
 
 
 def _time_in_play(model, body_q) -> np.ndarray:
-    """Frames (worlds,) until the ball is more than a stride from the player's root or has stopped bouncing.
+    """Frames (worlds,) until the ball is more than a stride from the player's root or has stopped
+    bouncing.
 
     body_q: (frames, worlds, nbody, 7).
     """

@@ -1,8 +1,9 @@
 """A simulated take as USD: what moved, as anyone's viewer shows it.
 
-Z up, metres, kilograms, one time code per frame, `/World` as the default prim with the player, the ball and the court
-below it. Every moving body is one Xform with translate and orient, as default value (frame 0) and as time samples;
-what is seen are meshes with normals, a bound UsdPreviewSurface and displayColor.
+Z up, metres, kilograms, one time code per frame, `/World` as the default prim with the player, the
+ball and the court below it. Every moving body is one Xform with translate and orient, as default
+value (frame 0) and as time samples; what is seen are meshes with normals, a bound UsdPreviewSurface
+and displayColor.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Take:
 
     body_names: list[str]
     shapes: list
-    """Objects with name, body (int, -1 = world), kind, size, pos, quat xyzw and rgba, as `sims.Model.shapes`."""
+    """Objects with name, body (int, -1 = world), kind, size, pos, quat xyzw and rgba, as
+    `sims.Model.shapes`."""
     body_q: np.ndarray
     """(frames, bodies, 7) [m, -], position and quaternion xyzw of each body frame in the world."""
     fps: float
@@ -58,7 +60,8 @@ class Take:
 
 
 def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
-    """The path, once its suffix is known and its folder is there (it is made) and takes files. Raises TakeError."""
+    """The path, once its suffix is known and its folder is there (it is made) and takes files.
+    Raises TakeError."""
     path = Path(path)
     if path.suffix not in suffixes:
         raise TakeError(path, f"name the output with one of {', '.join(suffixes)}")
@@ -75,7 +78,8 @@ def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Pa
 
 @contextlib.contextmanager
 def written_whole(path: Path):
-    """A temporary name beside `path` to write to: moved to `path` at the end, removed when anything fails."""
+    """A temporary name beside `path` to write to: moved to `path` at the end, removed when
+    anything fails."""
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as folder:
         part = Path(folder) / path.name
         yield part
@@ -83,7 +87,8 @@ def written_whole(path: Path):
 
 
 def write_take(path: str | Path, take: Take) -> Path:
-    """Write a take as .usda, .usdc or .usdz; the file appears whole or not at all. Raises TakeError."""
+    """Write a take as .usda, .usdc or .usdz; the file appears whole or not at all. Raises
+    TakeError."""
     path = check_writable(path)
     try:
         with written_whole(path) as part:
@@ -155,7 +160,8 @@ def _component(stage, path):
 
 
 def _animate(stage, take: Take, paths: dict[str, str]) -> None:
-    """Translate and orient of every body: default = frame 0, and a sample per frame, written below the stage's API."""
+    """Translate and orient of every body: default = frame 0, and a sample per frame, written
+    below the stage's API."""
     layer = stage.GetRootLayer()
     positions = take.body_q[:, :, :3].astype(float)
     quats = continuous_quaternions(take.body_q[:, :, 3:])
@@ -178,7 +184,8 @@ def _animate(stage, take: Take, paths: dict[str, str]) -> None:
 
 
 def continuous_quaternions(quaternions: np.ndarray) -> np.ndarray:
-    """The same rotations (frames, ..., 4), normalised, with signs so that neighbouring frames are near each other."""
+    """The same rotations (frames, ..., 4), normalised, with signs so that neighbouring frames
+    are near each other."""
     quaternions = quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
     flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
     signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
@@ -189,7 +196,8 @@ def continuous_quaternions(quaternions: np.ndarray) -> np.ndarray:
 def _visuals(stage, parent: str, name: str, shapes: list, seams: bool) -> None:
     """One mesh per colour of a body's shapes, named `<body>_visual`, `<body>_visual_2`, ...
 
-    Seams are a mesh of their own: Blender gives faces outside a material subset the first subset's material.
+    Seams are a mesh of their own: Blender gives faces outside a material subset the first subset's
+    material.
     """
     colours = list(dict.fromkeys(tuple(np.round(s.rgba, 4).tolist()) for s in shapes))
     drawn = 0
@@ -200,7 +208,10 @@ def _visuals(stage, parent: str, name: str, shapes: list, seams: bool) -> None:
         parts = [(mesh, colour)]
         if seams:
             seam = meshes.ball_seams(mesh)
-            parts = [(meshes.faces_of(mesh, ~seam), colour), (meshes.faces_of(mesh, seam), SEAM_COLOUR)]
+            parts = [
+                (meshes.faces_of(mesh, ~seam), colour),
+                (meshes.faces_of(mesh, seam), SEAM_COLOUR),
+            ]
         for part, part_colour in parts:
             drawn += 1
             path = f"{parent}/{name}_visual" + (f"_{drawn}" if drawn > 1 else "")

@@ -69,9 +69,10 @@ def test_repeated_cycles_join_without_a_jump(player, count):
     steps = np.abs(difference(player, joint_q[:-1], joint_q[1:]))
     assert steps[:, 6:].max() == pytest.approx(inside[:, 6:].max())
     length = np.linalg.norm(np.diff(joint_q[:, :2], axis=0), axis=1)
-    assert length.max() < 1.001 * np.linalg.norm(
-        np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1
-    ).max()
+    assert (
+        length.max()
+        < 1.001 * np.linalg.norm(np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1).max()
+    )
 
 
 def test_a_cycle_cannot_be_repeated_less_than_once(player):
