@@ -88,7 +88,12 @@ COLOURS = {"skin": "0.80 0.60 0.47 1", "hair": "0.18 0.13 0.10 1", "jersey": "0.
 STAND = {"shoulder": np.array([-1.42, 0, 0]), "elbow": np.array([0.25])}
 FIST = {finger: (1.45, 1.65, 1.0) for finger in FINGERS} | {"thumb": (0.55, 0.75, 0.9)}
 # P1 Eq. 1: lambda of the way from the flat hand (all zero) to the fist; P1's idle hand has 0.2.
-KEYFRAMES = {"start": 0.2, "flat": 0.0, "fist": 1.0}
+HOLD = {  # the ball at rest on the upturned right palm
+    "r_elbow": 1.5,
+    "r_wrist": np.array([0.1218, -1.7173, 0]),
+    "ball": (0.348, -0.209, 1.225),
+}
+KEYFRAMES = {"start": (0.2, {}), "flat": (0.0, {}), "fist": (1.0, {}), "hold": (0.2, HOLD)}
 
 BALL_RADIUS, BALL_MASS, BALL_XY = 0.1193, 0.6237, (0.35, -0.35)
 MIRROR = np.array([1, -1, 1])
@@ -278,8 +283,11 @@ def bodies() -> list[Body]:
     return trunk() + [b for part in left for b in [*part, *(b.mirrored() for b in part)]]
 
 
-def target(body: Body, grip: float) -> np.ndarray:
-    """Rotation vector or angle [rad] of a joint in the stand, hands closed by `grip`."""
+def target(body: Body, grip: float, pose: dict) -> np.ndarray:
+    """Rotation vector or angle [rad] of a joint in the stand, hands closed by `grip`, with `pose` in
+    place of the stand for the joints that it names."""
+    if body.joint in pose:
+        return np.atleast_1d(pose[body.joint])
     side, _, name = body.joint.partition("_")
     size = 3 if JOINTS[body.drive][0] == "ball" else 1
     finger = name.split("_")[0]
@@ -357,10 +365,11 @@ def mjcf() -> str:
     add(custom, "text", name="ball", data="ball")
 
     keyframe, upright = add(root, "keyframe"), vec(1, 0, 0, 0)
-    for name, grip in KEYFRAMES.items():
-        ctrl = [target(b, grip) for b in player[1:]]
+    for name, (grip, pose) in KEYFRAMES.items():
+        ctrl = [target(b, grip, pose) for b in player[1:]]
+        ball_at = pose.get("ball", (*BALL_XY, BALL_RADIUS))
         q = [Rotation.from_rotvec(t).as_quat(scalar_first=True) if len(t) == 3 else t for t in ctrl]
-        qpos = [player[0].at, upright, *q, (*BALL_XY, BALL_RADIUS), upright]
+        qpos = [player[0].at, upright, *q, ball_at, upright]
         add(keyframe, "key", name=name, qpos=text(np.concatenate(qpos), 9),
             ctrl=text(np.concatenate(ctrl), 9))  # fmt: skip
     ET.indent(root)

@@ -22,7 +22,7 @@ from .spatial import (
     frame,
     mul,
     neg,
-    row,
+    norm,
     sub,
     where_lt,
     zero3,
@@ -32,9 +32,15 @@ from .tree import BALL, FREE, HINGE, Tree, World
 NEVER = wp.constant(-1.0e9)
 """Normal velocity [m/s] that every slot exceeds: the goal of a lane that does not touch."""
 MARGIN = wp.constant(0.002)
-"""Slots that would come this near within the step take part [m]."""
+"""Slots that may come this near within the step, in whichever direction their present velocity is
+turned, take part [m]."""
 PUSH_LIMIT = wp.constant(2.0)
 """Overlap is taken back no faster than this [m/s]."""
+
+
+HEAD = wp.constant(5)
+"""Entries of a slot's response before those of its dofs: G and its inverse, a symmetric matrix each,
+and what depends on it alone."""
 
 
 @wp.struct
@@ -135,11 +141,12 @@ def joint_dofs(tree: Tree, i: int) -> int:
 
 @wp.func
 def respond(tree: Tree, world: World, g: int, slot: int, at: int):
-    """y of a slot's three rows, from world.y[at + 2] on, and its own matrix y^T y before it."""
+    """y of a slot's three rows, from world.y[at + HEAD] on, and before it what `settle` asks of the
+    slot's own matrix G = y^T y."""
     axes = frame(world.normal[g, slot])
     point = world.point[g, slot]
     meet = tree.slot_meet[slot]
-    k = at + 2
+    k = at + HEAD
     i = tree.slot_link_b[slot]
     F = wrenches(axes, point - world.pos[g, i], 1.0)
     while i != meet:
@@ -157,26 +164,38 @@ def respond(tree: Tree, world: World, g: int, slot: int, at: int):
         F = carry(pass_joint(tree, world, g, i, F, k), world.r[g, i])
         k = k + joint_dofs(tree, i)
         i = tree.link_parent[i]
-    a = zero3()  # nn, nt, nu
-    b = zero3()  # tt, tu, uu
-    for c in range(at + 2, k):
+    a = zero3()  # nn, nt, ns
+    b = zero3()  # tt, ts, ss
+    for c in range(at + HEAD, k):
         y = world.y[g, c]
         a = a + y.x * y
         b = b + Vec3(y.y * y.y, y.y * y.z, y.z * y.z)
     world.y[g, at] = a
     world.y[g, at + 1] = b
+    # the inverse, by cofactors, with the normal softened
+    nn = a.x + tree.pair_cfm[tree.slot_pair[slot]] / tree.h
+    cn = b.x * b.z - b.y * b.y
+    ct = a.z * b.y - a.y * b.z
+    cs = a.y * b.y - a.z * b.x
+    scale = 1.0 / most(nn * cn + a.y * ct + a.z * cs, fill(1.0e-24))
+    world.y[g, at + 2] = scale * Vec3(cn, ct, cs)
+    world.y[g, at + 3] = scale * Vec3(nn * b.z - a.z * a.z, a.y * a.z - nn * b.y, nn * b.x - a.y * a.y)
+    # the softened normal, and the longest stable step along a tangent: 1 / its larger eigenvalue
+    skew = 0.5 * (b.x - b.z)
+    stiff = 0.5 * (b.x + b.z) + root(skew * skew + b.y * b.y)
+    world.y[g, at + 4] = Vec3(nn, 1.0 / most(stiff, fill(1.0e-12)), stiff)
 
 
 @wp.func
-def approach(tree: Tree, world: World, g: int, slot: int, point: Vec3, normal: Vec3) -> Real:
-    """Normal velocity [m/s] of b away from a at the start of the step."""
+def parting(tree: Tree, world: World, g: int, slot: int, point: Vec3) -> Vec3:
+    """Velocity [m/s] of b relative to a at the start of the step."""
     a = tree.slot_link_a[slot]
     b = tree.slot_link_b[slot]
     Va = world.V[g, a]
     Vb = world.V[g, b]
     va = Va.v + cross(Va.w, point - world.pos[g, a])
     vb = Vb.v + cross(Vb.w, point - world.pos[g, b])
-    return dot(normal, vb - va)
+    return vb - va
 
 
 @wp.func
@@ -184,7 +203,7 @@ def add_impulse(tree: Tree, world: World, g: int, slot: int, at: int, change: Ve
     first = tree.slot_dof[slot]
     for k in range(tree.slot_length[slot]):
         j = tree.response_dof[first + k]
-        world.w[g, j] = world.w[g, j] + dot(world.y[g, at + 2 + k], change)
+        world.w[g, j] = world.w[g, j] + dot(world.y[g, at + HEAD + k], change)
 
 
 @wp.func
@@ -207,7 +226,7 @@ def enlist(tree: Tree, world: World, g: int, slot: int, touch: Touch, near: Real
     last = 2 * tree.slot_count
     n = world.active[g, last]
     at = world.active[g, last + 1]
-    end = at + tree.slot_length[slot] + 2
+    end = at + tree.slot_length[slot] + HEAD
     if end > tree.response_room:
         at = tree.response_room
         end = world.active[g, last + 1]
@@ -238,15 +257,15 @@ def find(tree: Tree, world: World, g: int):
     for slot in range(tree.slot_count):
         if tree.slot_flight[slot] == 0:
             touch = probe(tree, world, g, slot)
-            u = approach(tree, world, g, slot, touch.point, touch.normal)
-            near = least(touch.gap, touch.gap + tree.h * u)
+            v = parting(tree, world, g, slot, touch.point)
+            near = touch.gap - tree.h * norm(v)
             world.gap[g, slot] = touch.gap
             if any_lt(near, margin):
                 a = tree.slot_link_a[slot]
                 b = tree.slot_link_b[slot]
                 world.touched[g, a] = least(world.touched[g, a], near)
                 world.touched[g, b] = least(world.touched[g, b], near)
-                goal = wish(tree, world, g, slot, touch.gap, u, far)
+                goal = wish(tree, world, g, slot, touch.gap, dot(touch.normal, v), far)
                 enlist(tree, world, g, slot, touch, near, goal)
             else:
                 world.impulse[g, slot] = zero3()
@@ -254,64 +273,91 @@ def find(tree: Tree, world: World, g: int):
         i = tree.flight_link[f]
         slot = tree.flight_slot[f]
         touch = probe(tree, world, g, slot)
-        u = approach(tree, world, g, slot, touch.point, touch.normal)
-        near = least(touch.gap, touch.gap + tree.h * u)
+        v = parting(tree, world, g, slot, touch.point)
+        near = touch.gap - tree.h * norm(v)
         free = world.touched[g, i] - margin
         world.gap[g, slot] = touch.gap
         world.knock[g, i] = fill(0.0)
         if any_lt(near, margin):
             hits = bounce(tree, world, g, i, slot, touch, free)
             near = where_lt(fill(0.0), hits, far, near)
-            enlist(tree, world, g, slot, touch, near, wish(tree, world, g, slot, touch.gap, u, neg(free)))
+            goal = wish(tree, world, g, slot, touch.gap, dot(touch.normal, v), neg(free))
+            enlist(tree, world, g, slot, touch, near, goal)
         else:
             world.impulse[g, slot] = zero3()
 
 
 @wp.func
-def visit(tree: Tree, world: World, g: int, slot: int, at: int) -> Vec3:
-    """The impulse that suits a slot as things stand: along the normal, then friction on the disc that
-    this allows."""
+def velocity(tree: Tree, world: World, g: int, slot: int, at: int) -> Vec3:
+    """Velocity in a slot as things stand [m/s]."""
     first = tree.slot_dof[slot]
     u = zero3()
     for k in range(tree.slot_length[slot]):
-        u = u + world.w[g, tree.response_dof[first + k]] * world.y[g, at + 2 + k]
-    a = world.y[g, at]
-    b = world.y[g, at + 1]
-    old = world.impulse[g, slot]
-    pair = tree.slot_pair[slot]
-    soft = tree.pair_cfm[pair] / tree.h
-    n = most(fill(0.0), old.x - (u.x + soft * old.x - world.goal[g, slot]) / (a.x + soft))
-    dn = n - old.x
-    # a step as long as the stiffer tangent allows, and back onto the disc
-    pace = 1.0 / most(stiffer(b), fill(1.0e-12))
-    t = old.y - pace * (u.y + a.y * dn)
-    s = old.z - pace * (u.z + a.z * dn)
-    grip = world.friction[g, pair] * n
-    pull = t * t + s * s
-    back = where_lt(grip * grip, pull, grip / root(most(pull, fill(1.0e-24))), fill(1.0))
-    return Vec3(n, back * t, back * s)
+        u = u + world.w[g, tree.response_dof[first + k]] * world.y[g, at + HEAD + k]
+    return u
 
 
 @wp.func
-def stiffer(b: Vec3) -> Real:
-    """The larger eigenvalue of the two tangents' matrix [[x, y], [y, z]]."""
-    skew = 0.5 * (b.x - b.z)
-    return 0.5 * (b.x + b.z) + root(skew * skew + b.y * b.y)
+def settle(world: World, g: int, at: int, u: Vec3, old: Vec3, goal: Real, friction: Real) -> Vec3:
+    """The impulse that suits a slot by itself, u being its velocity with the impulse `old`: sticking
+    where friction allows it; else slipping, normal and friction found together, as friction may lift
+    or press."""
+    a = world.y[g, at]
+    b = world.y[g, at + 1]
+    more = world.y[g, at + 4]
+    zero = fill(0.0)
+    # what the velocity lacks, were the impulse taken away
+    n0 = goal - (u.x - a.x * old.x - a.y * old.y - a.z * old.z)
+    t0 = a.y * old.x + b.x * old.y + b.y * old.z - u.y
+    s0 = a.z * old.x + b.y * old.y + b.z * old.z - u.z
+    # sticking: G x = (n0, t0, s0)
+    c = world.y[g, at + 2]
+    d = world.y[g, at + 3]
+    n = c.x * n0 + c.y * t0 + c.z * s0
+    t = c.y * n0 + d.x * t0 + d.y * s0
+    s = c.z * n0 + d.y * t0 + d.z * s0
+    grip = friction * most(n, zero)
+    slips = t * t + s * s - grip * grip
+    # slipping: against the slip, by as long a step as is stable
+    dt = old.y - more.y * u.y
+    ds = old.z - more.y * u.z
+    unit = 1.0 / root(most(dt * dt + ds * ds, fill(1.0e-24)))
+    dt = unit * dt
+    ds = unit * ds
+    n_slip = most(n0, zero) / most(more.x + friction * (a.y * dt + a.z * ds), 0.5 * more.x)
+    grip = friction * n_slip
+    return Vec3(
+        where_lt(slips, zero, n, n_slip),
+        where_lt(slips, zero, t, grip * dt),
+        where_lt(slips, zero, s, grip * ds),
+    )
 
 
 @wp.func
 def residual(tree: Tree, world: World, g: int) -> Real:
-    """Largest velocity [m/s] that one more visit would take from any slot."""
+    """Largest velocity [m/s] by which a slot misses non-penetration or Coulomb's law: the step of the
+    natural map, times the slot's inverse inertia."""
     worst = fill(0.0)
     for k in range(world.active[g, 2 * tree.slot_count]):
         slot = world.active[g, 2 * k]
         at = world.active[g, 2 * k + 1]
         if at == tree.response_room:
             respond(tree, world, g, slot, at)
-        change = visit(tree, world, g, slot, at) - world.impulse[g, slot]
-        pull = root(change.y * change.y + change.z * change.z)
-        worst = most(worst, world.y[g, at].x * size(change.x))
-        worst = most(worst, stiffer(world.y[g, at + 1]) * pull)
+        u = velocity(tree, world, g, slot, at)
+        x = world.impulse[g, slot]
+        pair = tree.slot_pair[slot]
+        soft = tree.pair_cfm[pair] / tree.h
+        nn = world.y[g, at].x
+        n = most(fill(0.0), x.x - (u.x + soft * x.x - world.goal[g, slot]) / nn)
+        stiff = world.y[g, at + 4].z
+        t = x.y - u.y / stiff
+        s = x.z - u.z / stiff
+        grip = world.friction[g, pair] * x.x
+        back = least(grip / root(most(t * t + s * s, fill(1.0e-24))), fill(1.0))
+        t = back * t - x.y
+        s = back * s - x.z
+        worst = most(worst, nn * size(n - x.x))
+        worst = most(worst, stiff * root(t * t + s * s))
     return worst
 
 
@@ -328,8 +374,11 @@ def solve(tree: Tree, world: World, g: int):
             at = world.active[g, 2 * c + 1]
             if at == tree.response_room:
                 respond(tree, world, g, slot, at)
-            impulse = visit(tree, world, g, slot, at)
-            add_impulse(tree, world, g, slot, at, impulse - world.impulse[g, slot])
+            pair = tree.slot_pair[slot]
+            old = world.impulse[g, slot]
+            u = velocity(tree, world, g, slot, at)
+            impulse = settle(world, g, at, u, old, world.goal[g, slot], world.friction[g, pair])
+            add_impulse(tree, world, g, slot, at, impulse - old)
             world.impulse[g, slot] = impulse
     zero = fill(0.0)
     one = fill(1.0)

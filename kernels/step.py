@@ -6,7 +6,7 @@
 import warp as wp
 
 from .articulated import factorize, velocities
-from .contact import find, residual, solve
+from .contact import HEAD, find, residual, solve  # noqa: F401
 from .integrate import integrate
 from .kinematics import inertias, kinematics
 from .lanes import Real  # noqa: F401

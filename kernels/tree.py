@@ -163,7 +163,7 @@ class World:
     impulse: wp.array2d(dtype=Vec3)
     """along the normal and two tangents [N s]"""
     y: wp.array2d(dtype=Vec3)
-    """responses of the slots in use: two entries for the slot's own matrix, then one per dof"""
+    """responses of the slots in use, the head of each and then an entry per dof (see `contact`)"""
     active: wp.array2d(dtype=int)
     """slots in use by some lane of the group, each followed by its place in y; last, their number and
     the end of y"""

@@ -112,14 +112,14 @@ class Simulation:
         tree.sweeps = sweeps
         tree.forced = 0
         lengths = model.tables.get("slot_length", np.zeros(0, int))
-        tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + 2 * len(lengths)))
+        tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
         return tree
 
     def _make_world(self):
         """State of all worlds, `(groups, n)` each."""
         program, model, tree = self._program, self.model, self._tree
         links = tree.link_count + 1
-        longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + 2
+        longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + program.HEAD
         counts = dict.fromkeys(("q", "target"), model.nq)
         counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
         counts |= dict.fromkeys(

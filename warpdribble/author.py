@@ -9,16 +9,19 @@ every push; arms and legs are solved for hands and feet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from .sims import pose
 from .sims.reference import Reference, resample_q, root_joint
 
 GRAVITY = 9.81
+HAND_YAW = np.radians(18.0)
+"""Of the fingers on the ball, from straight ahead toward the left."""
 
 
 @dataclass(frozen=True)
@@ -26,21 +29,21 @@ class Dribble:
     """Numbers of the authored dribble. Lengths in metres, times in seconds, angles in degrees,
     speeds in m/s."""
 
-    period: float = 0.72
-    release_height: float = 0.775
-    """Of the ball's centre, where it leaves the hand and where it comes back to it."""
-    release_speed: float = 3.3
-    """Downward."""
+    period: float = 0.70
+    hold: float = 0.22
+    """How long the hand has the ball in a cycle."""
+    release_height: float = 0.76
+    """Of the ball's centre, where it leaves the hand."""
     restitution: float = 0.8
-    lowest_palm: float = 0.785
+    lowest_palm: float = 0.74
     """The hand follows through to here before it rises to meet the ball."""
-    ball_place: tuple[float, float] = (0.36, -0.29)
+    ball_place: tuple[float, float] = (0.38, -0.28)
     """Forward and left of the middle between the feet."""
-    pelvis_height: float = 0.87
-    pelvis_back: float = 0.05
+    pelvis_height: float = 0.84
+    pelvis_back: float = 0.07
     give: float = 0.008
     """Amplitude of the pelvis' bob."""
-    lean: tuple[float, float, float] = (10.0, 11.0, 10.0)
+    lean: tuple[float, float, float] = (12.0, 12.0, 11.0)
     """Forward bend of pelvis, lower back and torso."""
     gaze: float = 12.0
     """Below the horizon."""
@@ -48,8 +51,10 @@ class Dribble:
     """Left and right ankle: forward, left, turned out."""
     curl: float = 0.2
     """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
-    fingers: tuple[float, float] = (14.0, 38.0)
-    """Tilt of the fingers below the horizon, at the top of the stroke and after the release."""
+    fingers: tuple[float, float] = (4.0, 34.0)
+    """Tilt of the fingers below the horizon, on the ball and after the release."""
+    roll: float = 0.0
+    """Of the palm on the ball, toward the left."""
 
 
 @dataclass(frozen=True)
@@ -71,74 +76,91 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
     """The authored right-hand dribble on the player, at its time step; the ball's path is in its
     coordinates.
 
-    Raises ValueError when the numbers ask for a ball that does not come back to the hand.
+    Raises ValueError when no ball could do what the numbers ask for.
     """
     steps = round(style.period / model.timestep)
     times = np.arange(steps + 1) * model.timestep
     period = steps * model.timestep
+    style = replace(style, period=period)
     ball_body = model.body("ball")
     radius = next(s.size[0] for s in model.shapes if s.body == ball_body)
-    flight, ball_height, palm_height = _stroke(style, period, radius)
+    flight, ball_height, palm_height = _stroke(style, radius)
     phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
 
     joint_q = np.tile(_fingers(model, style.curl), (steps + 1, 1))
     _trunk(model, joint_q, style, phase)
     _legs(model, joint_q, style)
     _left_arm(model, joint_q, phase)
-    palm = np.column_stack([np.tile(style.ball_place, (steps + 1, 1)), palm_height(times % period)])
-    tilt = np.interp(np.cos(phase), [-1.0, 1.0], style.fingers[::-1])
-    _right_arm(model, joint_q, palm, np.radians(tilt))
+    under = np.tile([*style.ball_place, -radius], (steps + 1, 1))
+    under[:, 2] += palm_height(times % period)
+    snap = np.sin(np.pi * np.minimum(times % period / flight, 1.0) ** 0.7) ** 2
+    tilt = np.interp(snap, [0.0, 1.0], style.fingers)
+    _right_arm(model, joint_q, under, radius, np.radians(tilt), np.radians(style.roll))
     ball = model.q_slice("ball")
     joint_q[:, ball.start : ball.start + 2] = style.ball_place
     joint_q[:, ball.start + 2] = ball_height(times % period)
     joint_q[-1] = joint_q[0]
-    lowest = float(times[np.argmin(palm[:, 2])])
+    lowest = float(times[np.argmin(under[:, 2])])
     return AuthoredClip(
         Reference(joint_q, model.timestep), "r_hand", (flight, period), lowest, style.restitution
     )
 
 
-def ball_flight(height: float, speed: float, restitution: float, radius: float):
-    """Down, bounce and up again to the same height: time down [s], time up [s], speed back at that
-    height [m/s].
+def release_speed(style: Dribble, radius: float) -> float:
+    """The speed [m/s] at which the ball has to leave the hand for the cycle to close.
 
-    height: of the centre [m] where it starts with `speed` [m/s] downward. Raises ValueError if it
-    does not come back.
+    Raises ValueError when there is none.
     """
-    fall = height - radius
-    impact = np.sqrt(speed**2 + 2.0 * GRAVITY * fall)
-    left = (restitution * impact) ** 2 - 2.0 * GRAVITY * fall
-    if left <= 0.0:
-        raise ValueError(
-            f"a ball released at {height} m with {speed} m/s does not come back to that height"
-        )
-    back = float(np.sqrt(left))
-    return (impact - speed) / GRAVITY, (restitution * impact - back) / GRAVITY, back
+    speeds = np.linspace(0.2, 12.0, 119)
+    missed = np.array([_cycle(style, radius, v)[-1] for v in speeds])
+    change = np.flatnonzero((missed[:-1] < 0.0) != (missed[1:] < 0.0))
+    if not len(change):
+        raise ValueError("this dribble has no ball that comes back to the hand in time")
+    k = change[0]
+    return brentq(lambda v: _cycle(style, radius, v)[-1], speeds[k], speeds[k + 1])
 
 
-def _stroke(style: Dribble, period: float, radius: float):
-    """Duration of the flight, and heights of ball and palm as functions of the time since the
-    release."""
-    down, up, back = ball_flight(
-        style.release_height, style.release_speed, style.restitution, radius
-    )
+def _cycle(style: Dribble, radius: float, v: float):
+    """Time down and up, height and speed at the catch, growth of the push, height missed at the end.
+
+    In flight the ball falls freely and leaves the ground with e times the speed it came with. In the
+    hand its acceleration is -g - k t: the push grows from nothing, so the hand never has to pull.
+    """
+    fall = style.release_height - radius
+    impact = np.sqrt(v**2 + 2.0 * GRAVITY * fall)
+    down = (impact - v) / GRAVITY
+    up = style.period - style.hold - down
+    back = style.restitution * impact - GRAVITY * up
+    catch = radius + style.restitution * impact * up - 0.5 * GRAVITY * up**2
+    t = style.hold
+    k = 2.0 * (back + v - GRAVITY * t) / t**2
+    end = catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
+    return down, up, catch, back, k, end - style.release_height
+
+
+def _stroke(style: Dribble, radius: float):
+    """Heights of the ball and of the palm as functions of the time since the release."""
+    v = release_speed(style, radius)
+    down, up, catch, back, k, _ = _cycle(style, radius, v)
+    if min(up, k) < 0.0:
+        raise ValueError("this dribble holds the ball too long to push it down")
     flight = down + up
-    if flight > 0.8 * period:
-        raise ValueError(f"the ball is in the air for {flight:.2f} s of a {period:.2f} s cycle")
-    z, v = style.release_height, style.release_speed
-    carried = CubicHermiteSpline([flight, period], [z, z], [back, -v])
     impact = v + GRAVITY * down
 
+    def carried(t):
+        t = np.maximum(t - flight, 0.0)
+        return catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
+
     def ball(t):
-        falling = z - v * t - 0.5 * GRAVITY * t**2
+        falling = style.release_height - v * t - 0.5 * GRAVITY * t**2
         since = t - down
         rising = radius + style.restitution * impact * since - 0.5 * GRAVITY * since**2
         return np.where(t < down, falling, np.where(t < flight, rising, carried(t)))
 
-    touch = z + radius
+    touch = style.release_height + radius
     turn = 2.0 * (touch - style.lowest_palm) / v
     empty = CubicHermiteSpline(
-        [0.0, turn, flight], [touch, style.lowest_palm, touch], [-v, 0.0, back]
+        [0.0, turn, flight], [touch, style.lowest_palm, catch + radius], [-v, 0.0, back]
     )
 
     def palm(t):
@@ -197,19 +219,17 @@ def _left_arm(model, joint_q, phase) -> None:
     joint_q[:, model.q_slice("l_elbow")] = np.radians(50.0) + swing[:, None]
 
 
-def _right_arm(model, joint_q, palm: np.ndarray, tilt: np.ndarray) -> None:
-    """Palm (frames, 3) [m] down on the ball, fingers ahead and `tilt` (frames,) [rad] below the
-    horizon."""
+def _right_arm(model, joint_q, under, radius: float, tilt, roll: float) -> None:
+    """Palm down on a ball centred at `under` (frames, 3) [m], whether there is one or not.
+
+    The fingers point ahead, `tilt` (frames,) [rad] below the horizon.
+    """
     hand = model.body("r_hand")
     shape = next(s for s in model.shapes if s.body == hand)
     centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
-    yaw = np.radians(18.0)
-    fingers = np.column_stack(
-        [np.cos(yaw) * np.cos(tilt), np.sin(yaw) * np.cos(tilt), -np.sin(tilt)]
-    )
-    back = np.cross(fingers, [np.sin(yaw), -np.cos(yaw), 0.0])
-    back *= np.sign(back[:, 2:])
-    turn = pose.frame_of(fingers, back) * pose.frame_of([0.0, -1.0, 0.0], [0.0, 0.0, 1.0]).inv()
+    turn = Rotation.from_euler("ZYX", np.column_stack([0 * tilt + HAND_YAW, tilt, 0 * tilt + roll]))
+    turn = turn * Rotation.from_euler("z", 0.5 * np.pi)  # fingers, -Y in the zero pose, to +X
+    palm = under + radius * turn.apply([0.0, 0.0, 1.0])
     wrist = palm - turn.apply(centre)
     elbow_axis = np.array([0.35, -0.80, 0.50])
     _place(model, joint_q, "r_elbow", wrist, turn, elbow_axis)

@@ -126,7 +126,7 @@ def _run(command: Simulate | Demo) -> int:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
     import warp
 
-    warp.config.quiet = True
+    warp.config.log_level = warp.LOG_ERROR
     from .sims import Model
     from .take import check_writable
 

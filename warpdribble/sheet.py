@@ -17,7 +17,7 @@ from .take import Take, TakeError, check_writable, written_whole
 POSES = 8
 SPACING = 1.05
 """[m] between neighbouring poses."""
-VIEW = (-50.0, 12.0)
+VIEW = (-50.0, 0.0)
 """[deg] where the viewer stands: about the vertical from +X, and above the horizon."""
 INK = "#30363d"
 BALL_COLOUR, RIGHT_COLOUR, LEFT_COLOUR = "#d9662b", "#1f6fb4", "#5a9367"

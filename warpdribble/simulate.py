@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from .bvh import ClipError, read_bvh
 from .sims import gaps, pose
-from .sims.reference import Cycle, Reference, close_cycle, difference, integrate, root_joint
+from .sims.feedforward import leading_targets
+from .sims.reference import Cycle, Reference, close_cycle, difference, root_joint
 from .sims.retarget import CMU, retarget
 
 ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
@@ -159,7 +160,8 @@ def simulate(
         _put_ball(model, joint_q, joint_qd, ball)
     sim.reset(joint_q=joint_q, joint_qd=joint_qd)
     sim.set_root_drive(*(ROOT_DRIVE if root == "tracked" else (0.0,) * 4))
-    targets = _leading_targets(model, reference)
+    feet = [b for b in ("l_foot", "r_foot") if b in model.body_names]
+    targets = leading_targets(model, reference, feet, ROOT_DRIVE[1] / ROOT_DRIVE[0])
 
     body_q = np.empty((reference.frame_count, worlds, model.nbody, 7), np.float32)
     states = np.empty((reference.frame_count, worlds, model.nq), np.float32)
@@ -192,16 +194,6 @@ def _put_ball(model, joint_q, joint_qd, ball: BallStart) -> None:
     joint_q[:, q.start + 3 : q.stop] = [0.0, 0.0, 0.0, 1.0]
     joint_qd[:, dof.start : dof.start + 3] = ball.velocity + vary[:, 3:] * [0.1, 0.1, 0.2]
     joint_qd[:, dof.start + 3 : dof.stop] = 0.0
-
-
-def _leading_targets(model, reference: Reference) -> np.ndarray:
-    """Targets (frames, nq): the reference, ahead by kd/kp [s] of each degree of freedom along
-    its velocity."""
-    kp, kd = (np.array(model.tables[name], dtype=float) for name in ("dof_kp", "dof_kd"))
-    lead = np.divide(kd, kp, out=np.zeros_like(kd), where=kp > 0.0)
-    root = model.dof_slice(root_joint(model))
-    lead[root] = [ROOT_DRIVE[1] / ROOT_DRIVE[0]] * 3 + [ROOT_DRIVE[3] / ROOT_DRIVE[2]] * 3
-    return integrate(model, reference.joint_q, lead * reference.velocity(model))
 
 
 def _time_in_play(model, body_q) -> np.ndarray:
