@@ -11,6 +11,7 @@ import warp as wp
 from .bounce import BOUNCE_SPEED, bounce
 from .collide import Touch, probe
 from .lanes import Real, add, any_lt, div, fill, least, most, mul, neg, root, size, sub, where_lt
+from .rows import rows_change, rows_velocity
 from .spatial import (
     Force,
     Mat3,
@@ -38,6 +39,8 @@ PUSH_LIMIT = wp.constant(2.0)
 """Overlap is taken back no faster than this [m/s]."""
 
 
+REACH = wp.constant(0.3)
+"""Nothing comes nearer than this within a step [m]; at h = 0.01 s, 30 m/s."""
 HEAD = wp.constant(5)
 """Entries of a slot's response before those of its dofs: G and its inverse, a symmetric matrix each,
 and what depends on it alone."""
@@ -200,10 +203,16 @@ def parting(tree: Tree, world: World, g: int, slot: int, point: Vec3) -> Vec3:
 
 @wp.func
 def add_impulse(tree: Tree, world: World, g: int, slot: int, at: int, change: Vec3):
-    first = tree.slot_dof[slot]
-    for k in range(tree.slot_length[slot]):
-        j = tree.response_dof[first + k]
-        world.w[g, j] = world.w[g, j] + dot(world.y[g, at + HEAD + k], change)
+    rows_change(
+        world.y,
+        world.w,
+        tree.response_dof,
+        g,
+        at + HEAD,
+        tree.slot_dof[slot],
+        tree.slot_length[slot],
+        change,
+    )
 
 
 @wp.func
@@ -257,8 +266,11 @@ def find(tree: Tree, world: World, g: int):
     for slot in range(tree.slot_count):
         if tree.slot_flight[slot] == 0:
             touch = probe(tree, world, g, slot)
-            v = parting(tree, world, g, slot, touch.point)
-            near = touch.gap - tree.h * norm(v)
+            near = touch.gap
+            v = zero3()
+            if any_lt(near, fill(REACH)):
+                v = parting(tree, world, g, slot, touch.point)
+                near = touch.gap - tree.h * norm(v)
             world.gap[g, slot] = touch.gap
             if any_lt(near, margin):
                 a = tree.slot_link_a[slot]
@@ -290,11 +302,15 @@ def find(tree: Tree, world: World, g: int):
 @wp.func
 def velocity(tree: Tree, world: World, g: int, slot: int, at: int) -> Vec3:
     """Velocity in a slot as things stand [m/s]."""
-    first = tree.slot_dof[slot]
-    u = zero3()
-    for k in range(tree.slot_length[slot]):
-        u = u + world.w[g, tree.response_dof[first + k]] * world.y[g, at + HEAD + k]
-    return u
+    return rows_velocity(
+        world.y,
+        world.w,
+        tree.response_dof,
+        g,
+        at + HEAD,
+        tree.slot_dof[slot],
+        tree.slot_length[slot],
+    )
 
 
 @wp.func

@@ -380,6 +380,13 @@ class Simulation:
             impulse=impulse,
         )
 
+    def copy_contact_history(self, other: Simulation) -> None:
+        """Take over another simulation's impulses of the last step, from which a solve starts."""
+        impulse = other._rows(other._world.impulse)[: self.groups]
+        if other.model is not self.model or other.lanes != self.lanes:
+            raise ValueError("the other simulation must have the same model and lanes")
+        self._rows(self._world.impulse)[:] = impulse
+
     def contact_residual(self) -> np.ndarray:
         """(world_count,) largest velocity [m/s] by which a contact of the last step misses its law"""
         out = self._allocate(1, self._program.Real)

@@ -42,7 +42,7 @@ class Simulate:
 class Demo:
     """Simulate a dribble that comes with warpdribble; needs no data."""
 
-    repeat: int = 8
+    repeat: int = 5
     """How many dribbles."""
     root: Literal["free", "tracked"] = "free"
     """free: only the joints are driven. tracked: virtual forces hold the pelvis too."""
@@ -115,9 +115,9 @@ def _bench(arguments: list[str]) -> int:
     from importlib import import_module
 
     try:
-        bench = import_module(".bench", __package__)
+        bench = import_module(".benchmarks.command", __package__)
     except ModuleNotFoundError:
-        return _complain("no benchmarks here: run this in a checkout of warpdribble")
+        return _complain("the benchmarks are not installed")
     return bench.main(arguments) or 0
 
 
