@@ -17,9 +17,23 @@ are solved in these coordinates (see `contact`). `world.U` holds U D^(-1/2) and 
 
 import warp as wp
 
-from .drive import Push, pd, spring, stop
+from .drive import Push, judge, pd, spring, stop
 from .kinematics import drift, load3, load4, store3
-from .lanes import Real, add, any_lt, div, fill, most, mul, neg, root, size, sub, where_lt
+from .lanes import (
+    Real,
+    add,
+    any_lt,
+    div,
+    fill,
+    least,
+    most,
+    mul,
+    neg,
+    root,
+    size,
+    sub,
+    where_lt,
+)
 from .spatial import (
     Force,
     Inertia,
@@ -47,6 +61,7 @@ from .spatial import (
     turn,
     unit3,
     where_lt,
+    zero3,
 )
 from .tree import BALL, FREE, GROUND, HINGE, Tree, World
 
@@ -108,10 +123,11 @@ def free_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     R = world.R[g, i]
     v = load3(world.qd, g, j)
     w = load3(world.qd, g, j + 3)
-    effort = tree.link_effort[i]
+    none = fill(0.0)  # it has no effort limit
     away = logarithm(conjugate(load4(world.q, g, iq + 3)) * load4(world.target, g, iq + 3))
-    spin = pd(tree, j + 3, away, w, effort)
-    push = pd(tree, j, load3(world.target, g, iq) - load3(world.q, g, iq), v, effort)
+    spin = pd(tree, j + 3, fill(tree.dof_kp[j + 3]) * away, w, none, zero3())
+    away = load3(world.target, g, iq) - load3(world.q, g, iq)
+    push = pd(tree, j, fill(tree.dof_kp[j]) * away, v, none, zero3())
     b = take_out_turn(world, g, j + 5, b, column(R, 2), w.z, spin.force.z, spin.load, h)
     b = take_out_turn(world, g, j + 4, b, column(R, 1), w.y, spin.force.y, spin.load, h)
     b = take_out_turn(world, g, j + 3, b, column(R, 0), w.x, spin.force.x, spin.load, h)
@@ -136,7 +152,9 @@ def ball_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     q = load4(world.q, g, iq)
     R = world.R[g, i]
     v = load3(world.qd, g, j)
-    drive = pd(tree, j, logarithm(conjugate(q) * load4(world.target, g, iq)), v, tree.link_effort[i])
+    pull = fill(tree.dof_kp[j]) * logarithm(conjugate(q) * load4(world.target, g, iq))
+    world.pull[g, i] = pull
+    drive = pd(tree, j, pull, v, world.full[g, i], world.torque[g, i])
     if tree.link_sprung[i] != 0:
         drive = spring(tree, j, drive, logarithm(conjugate(q) * sprung(tree, iq)), v)
     # Any three orthogonal axes will do for a ball joint's motion: the link's own, or, at the limit,
@@ -173,7 +191,9 @@ def hinge_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     q = world.q[g, iq]
     v = world.qd[g, j]
     s = rotate(world.R[g, i], tree.link_axis[i])
-    drive = pd(tree, j, world.target[g, iq] - q, v, tree.link_effort[i])
+    pull = tree.dof_kp[j] * (world.target[g, iq] - q)
+    world.pull[g, i] = Vec3(pull, fill(0.0), fill(0.0))
+    drive = pd(tree, j, pull, v, world.full[g, i], world.torque[g, i].x)
     if tree.link_sprung[i] != 0:
         drive = spring(tree, j, drive, tree.q_spring[iq] - q, v)
     if tree.link_limited[i] != 0:
@@ -210,28 +230,69 @@ def factorize(tree: Tree, world: World, g: int):
 
 @wp.func
 def velocities(tree: Tree, world: World, g: int):
-    """Root to leaves: qd = L^-1 D^(-1/2) w, and V."""
+    """Root to leaves: qd = L^-1 D^(-1/2) w, and V. Joints turn no faster than tree.max_speed."""
+    fast = world.hurried[g, 0]
+    one = fill(1.0)
+    top = fill(tree.max_speed)
     for i in range(1, tree.link_count + 1):
         joint = tree.link_joint[i]
         j = tree.link_dof[i]
         V = shift_motion(world.V[g, tree.link_parent[i]], world.r[g, i])
         if joint == HINGE:
             v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+            fast = where_lt(top, size(v), one, fast)
+            v = most(neg(top), least(top, v))
             world.qd[g, j] = v
             V.w = V.w + v * world.s[g, j]
         else:
-            before = V.w
             if joint == FREE:
-                vx = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
-                V.v.x = V.v.x + vx
-                vy = world.d[g, j + 1] * (world.w[g, j + 1] - dot(V, world.U[g, j + 1]))
-                V.v.y = V.v.y + vy
-                vz = world.d[g, j + 2] * (world.w[g, j + 2] - dot(V, world.U[g, j + 2]))
-                V.v.z = V.v.z + vz
-                store3(world.qd, g, j, Vec3(vx, vy, vz))
-                j = j + 3
+                for k in range(3):
+                    v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+                    world.qd[g, j] = v
+                    V.v = V.v + v * world.s[g, j]
+                    j = j + 1
+            before = V.w
             for k in range(3):
                 v = world.d[g, j + k] * (world.w[g, j + k] - dot(V, world.U[g, j + k]))
                 V.w = V.w + v * world.s[g, j + k]
-            store3(world.qd, g, j, mul_t(world.R[g, i], V.w - before))
+            turn_rate = V.w - before
+            speed = norm(turn_rate)
+            fast = where_lt(top, speed, one, fast)
+            turn_rate = where_lt(top, speed, top / most(speed, one), one) * turn_rate
+            V.w = before + turn_rate
+            store3(world.qd, g, j, mul_t(world.R[g, i], turn_rate))
         world.V[g, i] = V
+    world.hurried[g, 0] = fast
+
+
+@wp.func
+def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
+    """Root to leaves: the velocities that w stands for, and by them, which drives are at their limit.
+    Whether any drive of any lane has changed. Uses p, which `factorize` has consumed, for V."""
+    changed = fill(0.0)
+    for i in range(1, tree.link_count + 1):
+        joint = tree.link_joint[i]
+        j = tree.link_dof[i]
+        above = world.p[g, tree.link_parent[i]]
+        V = shift_motion(Motion(above.n, above.f), world.r[g, i])
+        if joint == HINGE:
+            v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+            V.w = V.w + v * world.s[g, j]
+            if tree.link_driven[i] != 0:
+                end = Vec3(v, fill(0.0), fill(0.0))
+                changed = changed + judge(tree, world, g, i, end, trial)
+        else:
+            if joint == FREE:
+                for k in range(3):
+                    v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+                    V.v = V.v + v * world.s[g, j]
+                    j = j + 1
+            before = V.w
+            for k in range(3):
+                v = world.d[g, j + k] * (world.w[g, j + k] - dot(V, world.U[g, j + k]))
+                V.w = V.w + v * world.s[g, j + k]
+            if tree.link_driven[i] != 0:
+                end = mul_t(world.R[g, i], V.w - before)
+                changed = changed + judge(tree, world, g, i, end, trial)
+        world.p[g, i] = Force(V.w, V.v)
+    return any_lt(fill(0.5), changed)

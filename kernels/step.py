@@ -5,8 +5,9 @@
 
 import warp as wp
 
-from .articulated import factorize, velocities
+from .articulated import factorize, judge_drives, velocities
 from .contact import HEAD, find, residual, solve  # noqa: F401
+from .drive import LAST_TRIAL
 from .integrate import integrate
 from .kinematics import inertias, kinematics
 from .lanes import Real  # noqa: F401
@@ -31,8 +32,13 @@ def load(device) -> None:
 @wp.func
 def advance(tree: Tree, world: World, g: int):
     kinematics(tree, world, g)
-    inertias(tree, world, g)
-    factorize(tree, world, g)
+    trial = int(0)
+    while trial < LAST_TRIAL:
+        trial = trial + 1
+        inertias(tree, world, g)
+        factorize(tree, world, g)
+        if not judge_drives(tree, world, g, trial):
+            trial = LAST_TRIAL
     find(tree, world, g)
     solve(tree, world, g)
     velocities(tree, world, g)
@@ -65,6 +71,13 @@ def run_factorize(tree: Tree, world: World, first: int, count: int):
     g = first + wp.tid()
     for _k in range(count):
         factorize(tree, world, g)
+
+
+@wp.kernel
+def run_judge_drives(tree: Tree, world: World, first: int, count: int):
+    g = first + wp.tid()
+    for _k in range(count):
+        judge_drives(tree, world, g, 1)
 
 
 @wp.kernel

@@ -31,6 +31,8 @@ class Tree:
     h: float
     """time step [s]"""
     gravity: wp.vec3
+    max_speed: float
+    """no joint turns faster [rad/s]"""
     link_count: int
     """links, the ground not counted"""
     q_count: int
@@ -64,6 +66,8 @@ class Tree:
     """xy, xz, yz"""
     link_effort: wp.array(dtype=float)
     """largest drive torque [N m]; infinite where there is no limit"""
+    link_driven: wp.array(dtype=int)
+    """1: has a drive that may reach its limit"""
     link_limited: wp.array(dtype=int)
     link_lower: wp.array(dtype=float)
     link_upper: wp.array(dtype=float)
@@ -147,6 +151,13 @@ class World:
     I: wp.array2d(dtype=Inertia)
     p: wp.array2d(dtype=Force)
 
+    pull: wp.array2d(dtype=Vec3)
+    """kp (target - q) of each link's drive [N m]"""
+    torque: wp.array2d(dtype=Vec3)
+    """of a drive at its limit, link axes [N m]"""
+    full: wp.array2d(dtype=Real)
+    """1: the link's drive is at its limit"""
+
     s: wp.array2d(dtype=Vec3)
     U: wp.array2d(dtype=Force)
     d: wp.array2d(dtype=Real)
@@ -175,3 +186,5 @@ class World:
     broken: wp.array2d(dtype=Real)
     fallen: wp.array2d(dtype=Real)
     fumbled: wp.array2d(dtype=Real)
+    hurried: wp.array2d(dtype=Real)
+    """status flags: the state is not finite, a fall, a bad contact, a joint at max_speed"""

@@ -61,6 +61,7 @@ class Tables:
     link_axis: list = field(default_factory=lambda: [np.array([0, 0, 1.0])])
     link_zero: list = field(default_factory=lambda: [0.0])
     link_effort: list = field(default_factory=lambda: [ANYWHERE])
+    link_driven: list = field(default_factory=lambda: [0])
     link_limited: list = field(default_factory=lambda: [0])
     link_lower: list = field(default_factory=lambda: [0.0])
     link_upper: list = field(default_factory=lambda: [0.0])
@@ -195,6 +196,7 @@ def read_links(m) -> tuple[Tables, dict[str, np.ndarray]]:
             t.link_axis.append(m.jnt_axis[j].copy())
             t.link_zero.append(float(m.qpos0[q]) if joint == HINGE else 0.0)
             t.link_effort.append(ANYWHERE)
+            t.link_driven.append(0)
             t.link_limited.append(int(m.jnt_limited[j]))
             t.link_lower.append(float(low))
             t.link_upper.append(float(high))
@@ -272,4 +274,5 @@ def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray,
             t.link_effort[i] = float(effort[dof : dof + 3].min())
         elif t.link_joint[i] == HINGE:
             t.link_effort[i] = float(effort[dof])
+        t.link_driven[i] = int(kp[dof] > 0 and t.link_effort[i] < ANYWHERE)
     return kp, kd, notes

@@ -21,7 +21,10 @@ SWEEPS = 10
 """Sweeps of the contact solver a step; docs/contact.md shows the residual this leaves."""
 
 
-NONFINITE, FALL, BAD_CONTACT = 1, 2, 4
+MAX_SPEED = 100.0
+"""No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
+
+NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
 """Bits of `Simulation.status`."""
 
 
@@ -71,6 +74,7 @@ class Simulation:
         threads: int | None = None,
         lanes: int | None = None,
         sweeps: int = SWEEPS,
+        max_speed: float = MAX_SPEED,
     ):
         if world_count < 1:
             raise ValueError(f"world_count must be at least 1, not {world_count}")
@@ -78,6 +82,10 @@ class Simulation:
         self.world_count = world_count
         self.device = wp.get_device(device)
         on_cpu = self.device.is_cpu
+        if not sweeps >= 1:
+            raise ValueError(f"sweeps must be at least 1, not {sweeps}")
+        if not max_speed > 0:
+            raise ValueError(f"max_speed must be positive, not {max_speed}")
         self.lanes = lanes or (widest_lanes() if on_cpu else 1)
         if not on_cpu and self.lanes != 1:
             raise ValueError("lanes are for the CPU; on CUDA leave them out")
@@ -86,7 +94,7 @@ class Simulation:
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
-        self._tree = self._make_tree(sweeps)
+        self._tree = self._make_tree(sweeps, max_speed)
         self._world = self._make_world()
         self._targets_set = False
         self._fill_defaults()
@@ -94,7 +102,7 @@ class Simulation:
 
     # ----------------------------------------------------------------------------------- memory
 
-    def _make_tree(self, sweeps: int):
+    def _make_tree(self, sweeps: int, max_speed: float):
         """The model as the kernels' `Tree`."""
         program, model = self._program, self.model
         tree = program.Tree()
@@ -110,6 +118,7 @@ class Simulation:
         tree.slot_count = len(model.tables.get("slot_kind", ()))
         tree.flight_count = len(model.tables.get("flight_link", ()))
         tree.sweeps = sweeps
+        tree.max_speed = max_speed
         tree.forced = 0
         lengths = model.tables.get("slot_length", np.zeros(0, int))
         tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
@@ -123,11 +132,11 @@ class Simulation:
         counts = dict.fromkeys(("q", "target"), model.nq)
         counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
         counts |= dict.fromkeys(
-            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "touched", "knock"), links
+            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "pull", "torque", "full", "touched", "knock"), links
         )
         counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
         counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
-        counts |= dict.fromkeys(("broken", "fallen", "fumbled"), 1)
+        counts |= dict.fromkeys(("broken", "fallen", "fumbled", "hurried"), 1)
         counts |= {
             "force": model.nbody,
             "y": tree.response_room + longest,
@@ -175,7 +184,9 @@ class Simulation:
         rows = self._rows(array)
         columns = slice(None) if column is None else slice(column, column + 1)
         n, parts = rows[:, columns].shape[1:3]
-        values = np.asarray(values, np.float32).reshape(-1, n, parts)
+        values = np.asarray(values, np.float32)
+        if values.ndim:
+            values = values.reshape(-1, n, parts)
         values = np.broadcast_to(values, (len(worlds), n, parts))
         if len(worlds) and worlds[-1] == self.world_count - 1:
             spare = np.arange(self.world_count, self.groups * self.lanes)
@@ -240,9 +251,8 @@ class Simulation:
         self._write("qd", worlds, qd)
         if not self._targets_set:
             self._write("target", worlds, q)
-        for name in ("broken", "fallen", "fumbled"):
-            self._write(name, worlds, np.zeros(1))
-        self._write("impulse", worlds, np.zeros(self._world.impulse.shape[1] * 3))
+        for name in ("broken", "fallen", "fumbled", "hurried", "impulse", "full", "torque"):
+            self._write(name, worlds, 0.0)
 
     def set_targets(self, joint_target_q) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
@@ -352,11 +362,12 @@ class Simulation:
     @property
     def status(self) -> np.ndarray:
         """(world_count,) bit mask since the last reset: `NONFINITE`, `FALL` (a part of the player other
-        than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand)"""
-        flags = (NONFINITE, "broken"), (FALL, "fallen"), (BAD_CONTACT, "fumbled")
+        than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand),
+        `OVERSPEED` (a joint was held back to `max_speed`)"""
+        flags = {"broken": NONFINITE, "fallen": FALL, "fumbled": BAD_CONTACT, "hurried": OVERSPEED}
         return sum(
             bit * (self._read(getattr(self._world, name))[:, 0] > 0).astype(np.int32)
-            for bit, name in flags
+            for name, bit in flags.items()
         )
 
     def contacts(self) -> Contacts:
