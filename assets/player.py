@@ -91,7 +91,7 @@ FIST = {finger: (1.45, 1.65, 1.0) for finger in FINGERS} | {"thumb": (0.55, 0.75
 HOLD = {  # the ball at rest on the upturned right palm
     "r_elbow": 1.5,
     "r_wrist": np.array([0.1218, -1.7173, 0]),
-    "ball": (0.348, -0.209, 1.225),
+    "ball": (0.347, -0.209, 1.234),
 }
 KEYFRAMES = {"start": (0.2, {}), "flat": (0.0, {}), "fist": (1.0, {}), "hold": (0.2, HOLD)}
 

@@ -174,7 +174,8 @@ class Simulation:
     def _read(self, array: wp.array, count: int | None = None) -> np.ndarray:
         """`(world_count, count, parts)` of an array, parts dropped where there is one."""
         rows = self._rows(array)[:, :count]
-        rows = rows.transpose(0, 3, 1, 2).reshape(-1, *rows.shape[1:3])[: self.world_count]
+        rows = rows.transpose(0, 3, 1, 2).copy()  # never a view of what the next step changes
+        rows = rows.reshape(-1, *rows.shape[2:])[: self.world_count]
         return rows[..., 0] if rows.shape[-1] == 1 else rows
 
     def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
