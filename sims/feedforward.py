@@ -21,6 +21,8 @@ SMOOTH = 8.0
 """[Hz] Motion above this gives no torque: it is noise, or too short to matter."""
 STANDING = 0.04
 """[m] A foot this far up carries nothing."""
+SHARE = 0.6
+"""Of a joint's effort limit that targets may ask for in advance; the rest corrects errors."""
 LEVER = 0.1
 """[m] farthest that the ground's force acts from the middle of a foot."""
 
@@ -38,6 +40,12 @@ def leading_targets(model, reference: Reference, feet=(), root_lead: float = 0.0
     if feet:
         torque = holding_torques(model, reference, feet)
         ahead += np.divide(torque, kp, out=np.zeros_like(torque), where=kp > 0.0)
+    for name in model.joint_names:
+        if model.joint_type(name) != "free":
+            dofs = model.dof_slice(name)
+            effort = model.tables["link_effort"][model.joint_link[model.joint(name)]]
+            asked = np.linalg.norm(kp[dofs] * ahead[:, dofs], axis=1, keepdims=True)
+            ahead[:, dofs] *= np.minimum(1.0, SHARE * effort / np.maximum(asked, 1e-9))
     return integrate(model, reference.joint_q, ahead)
 
 

@@ -135,3 +135,23 @@ class Limb:
         bent = Rotation.from_rotvec(angle[:, None] * self.axis).apply(self.lower)
         own = frame_of(self.upper + bent, np.tile(self.axis, (len(bent), 1)))
         return frame_of(reach, hinge) * own.inv(), angle
+
+
+def place_limb(model, joint_q, hinge: str, end, end_turn: Rotation, axis) -> None:
+    """Solve a limb of joint_q (frames, nq) in place.
+
+    The body at the limb's far end gets its origin to `end` (3,) or (frames, 3) [m] and the world
+    rotation `end_turn`; the hinge's axis points toward `axis` (3,) or (frames, 3) in the world.
+    """
+    upper, lower, last = limb_bodies(model, hinge)
+    zero = forward(model, zero_q(model))[0, :, :3]
+    limb = Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
+    now = forward(model, joint_q)
+    frames = len(joint_q)
+    end, axis = (np.array(np.broadcast_to(v, (frames, 3))) for v in (end, axis))
+    turn, angle = limb.solve(now[:, upper, :3], end, axis)
+    parent = Rotation.from_quat(now[:, model.body_parent[upper], 3:])
+    joint_q[:, model.q_slice(body_joint(model, upper))] = (parent.inv() * turn).as_quat()
+    joint_q[:, model.q_slice(hinge)] = angle[:, None]
+    beyond = turn * Rotation.from_rotvec(angle[:, None] * model.joint_axis(hinge))
+    joint_q[:, model.q_slice(body_joint(model, last))] = (beyond.inv() * end_turn).as_quat()

@@ -9,6 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from .motion import interpolate_lines, interpolate_rotations
 
+BLEND = 0.4
+"""[s] at the end of a clip in which it is bent back to its beginning."""
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -76,13 +79,12 @@ class Cycle:
 
 
 def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35) -> Cycle:
-    """Make the last row of a reference meet its first, spreading what is missing evenly over the
-    rows.
+    """Make the end of a reference lead back to its first row (P1 7.1).
 
-    The way over the ground is kept as the cycle's travel and turn when the root ends more than
-    `travel_above` [m] or `turn_above` [rad] from where it began; a smaller one is drift of somebody
-    who stays in place, and is closed too. P1 7.1 blends at the ends only; spreading adds no
-    velocity step. Returns a Cycle.
+    What is missing is blended in over the last BLEND seconds, at most half the clip. The way over
+    the ground is kept as the cycle's travel and turn when the root ends more than `travel_above`
+    [m] or `turn_above` [rad] from where it began; a smaller one is drift of somebody who stays in
+    place, and is closed too.
     """
     root = model.q_slice(root_joint(model))
     first, last = reference.joint_q[0], reference.joint_q[-1]
@@ -95,7 +97,10 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     anchor = first[root][:2]
     goal[root] = _over_ground(first[root][None], anchor, anchor + travel, turn)[0]
     missing = difference(model, last[None], goal[None])
-    share = np.linspace(0.0, 1.0, reference.frame_count)[:, None]
+    span = min(BLEND, 0.5 * reference.duration)
+    before = reference.duration - reference.timestep * np.arange(reference.frame_count)
+    share = np.clip(1.0 - before / span, 0.0, 1.0)[:, None]
+    share = share**2 * (3.0 - 2.0 * share)
     closed = integrate(model, reference.joint_q, share * missing)
     size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
     return Cycle(replace(reference, joint_q=closed), turn, tuple(travel.tolist()), float(size))

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from . import gaps, pose
+from . import footing, pose
 from .motion import Motion
 from .reference import Reference, root_joint
 
@@ -33,8 +33,6 @@ class Mapping:
     of the limb."""
     legs: tuple[tuple[str, str, str, str], ...]
     """(hip body, foot body, hip joint, foot joint) of each leg: they set the scale."""
-    soles: tuple[str, ...]
-    """Bodies of the model whose shapes stand on the ground."""
     in_line: tuple[str, ...] = ()
     """Ends of limbs that continue the limb's line in the T-pose: hands, not feet."""
     smoothed: dict[str, float] = field(default_factory=dict)
@@ -75,7 +73,6 @@ CMU = Mapping(
         ("l_upper_leg", "l_foot", "LeftUpLeg", "LeftFoot"),
         ("r_upper_leg", "r_foot", "RightUpLeg", "RightFoot"),
     ),
-    soles=("l_foot", "l_toes", "r_foot", "r_toes"),
     in_line=("l_hand", "r_hand"),
     smoothed={"l_hand": 8.0, "r_hand": 8.0},
 )
@@ -96,20 +93,8 @@ def retarget(model, motion: Motion, mapping: Mapping = CMU) -> Reference:
     root = model.q_slice(root_joint(model))
     joint_q[:, root] = _root(model, motion, mapping, turned)
     _fill_joints(model, joint_q, turned)
-    joint_q[:, root.start + 2] -= ground_height(model, joint_q, mapping.soles)
+    footing.stand(model, joint_q, [foot for _, foot, _, _ in mapping.legs])
     return Reference(joint_q, model.timestep)
-
-
-def ground_height(model, joint_q: np.ndarray, soles, share: float = 0.2) -> float:
-    """[m] height that the lowest sole point stays above in all but `share` of the frames.
-
-    Somebody stands or pushes off most of the time, so this is the ground the feet were on, within
-    their noise.
-    """
-    body_q = pose.forward(model, joint_q)
-    return float(
-        np.quantile(gaps.lowest_point(model, body_q, [_body(model, name) for name in soles]), share)
-    )
 
 
 def _body_rotations(model, motion: Motion, mapping: Mapping) -> dict[str, Rotation]:
@@ -135,6 +120,10 @@ def _body_rotations(model, motion: Motion, mapping: Mapping) -> dict[str, Rotati
 def _match_limbs(model, motion, mapping, since_rest, rest_at) -> dict[str, Rotation]:
     """For the segments of each limb: what turns the model's zero pose into the recording's
     T-pose."""
+    unknown = [hinge for hinge in mapping.limbs if hinge not in model.joint_names]
+    if unknown:
+        has = ", ".join(model.joint_names)
+        raise ValueError(f"the model has no joint '{unknown[0]}' to retarget onto; it has {has}")
     match = {}
     zero = pose.forward(model, pose.zero_q(model))[0]
     for hinge, (near, middle, far) in mapping.limbs.items():
@@ -190,9 +179,26 @@ def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> Non
         now = Rotation.from_quat(pose.forward(model, joint_q)[:, body, 3:])
         wanted = now.inv() * turned[name]
         if model.joint_type(joint) == "ball":
-            joint_q[:, q] = wanted.as_quat()
+            joint_q[:, q] = _within_range(model, joint, wanted).as_quat()
         else:
             joint_q[:, q] += pose.twist(wanted, model.joint_axis(joint))[:, None]
+            joint_q[:, q] = np.clip(joint_q[:, q], *_range(model, joint))
+
+
+def _within_range(model, joint: str, turn: Rotation) -> Rotation:
+    """A ball joint's rotation, cut back along its axis to the joint's largest angle."""
+    vector = turn.as_rotvec()
+    angle = np.linalg.norm(vector, axis=1, keepdims=True)
+    largest = 0.95 * _range(model, joint)[1]
+    return Rotation.from_rotvec(vector * np.minimum(1.0, largest / np.maximum(angle, 1e-9)))
+
+
+def _range(model, joint: str) -> tuple[float, float]:
+    """[rad] limits of a joint, infinite where it has none."""
+    link = model.joint_link[model.joint(joint)]
+    if not model.tables["link_limited"][link]:
+        return -np.inf, np.inf
+    return float(model.tables["link_lower"][link]), float(model.tables["link_upper"][link])
 
 
 def _root(model, motion: Motion, mapping: Mapping, turned) -> np.ndarray:

@@ -13,6 +13,7 @@ import warp as wp
 
 from .. import kernels
 from .model import Model
+from .tensors import Tensors, as_array
 
 RESPONSE_ROOM = 1365
 """Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
@@ -217,8 +218,8 @@ class Simulation:
         return worlds.astype(int)
 
     def _values(self, name: str, values, n: int, count: int) -> np.ndarray:
-        """Checked `(n,)` or `(count, n)` float32."""
-        values = np.asarray(values, np.float32)
+        """Checked `(n,)` or `(count, n)` float32, from NumPy or torch."""
+        values = as_array(values)
         if values.shape not in ((n,), (count, n), (1, n)):
             raise ValueError(f"{name} must have shape ({n},) or ({count}, {n}), not {values.shape}")
         if not np.isfinite(values).all():
@@ -340,6 +341,11 @@ class Simulation:
     def joint_qd(self) -> np.ndarray:
         """(world_count, nv) [m/s, rad/s]"""
         return self._read(self._world.qd)
+
+    @property
+    def torch(self) -> Tensors:
+        """The state as torch tensors, without a copy where the layout allows"""
+        return Tensors(self)
 
     def _bodies(self) -> tuple[np.ndarray, np.ndarray]:
         n = self.model.nbody

@@ -30,14 +30,14 @@ class Dribble:
     speeds in m/s."""
 
     period: float = 0.70
-    hold: float = 0.22
+    hold: float = 0.23
     """How long the hand has the ball in a cycle."""
-    release_height: float = 0.76
+    release_height: float = 0.75
     """Of the ball's centre, where it leaves the hand."""
     restitution: float = 0.8
-    lowest_palm: float = 0.74
+    lowest_palm: float = 0.755
     """The hand follows through to here before it rises to meet the ball."""
-    ball_place: tuple[float, float] = (0.38, -0.28)
+    ball_place: tuple[float, float] = (0.34, -0.27)
     """Forward and left of the middle between the feet."""
     pelvis_height: float = 0.84
     pelvis_back: float = 0.07
@@ -49,11 +49,11 @@ class Dribble:
     """Below the horizon."""
     feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
     """Left and right ankle: forward, left, turned out."""
-    curl: float = 0.2
+    curl: float = 1.0
     """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
-    fingers: tuple[float, float] = (4.0, 34.0)
+    fingers: tuple[float, float] = (10.0, 34.0)
     """Tilt of the fingers below the horizon, on the ball and after the release."""
-    roll: float = 0.0
+    roll: float = 3.5
     """Of the palm on the ball, toward the left."""
 
 
@@ -121,10 +121,12 @@ def release_speed(style: Dribble, radius: float) -> float:
 
 
 def _cycle(style: Dribble, radius: float, v: float):
-    """Time down and up, height and speed at the catch, growth of the push, height missed at the end.
+    """Time down and up, height and speed at the catch, growth of the push, height missed at the
+    end.
 
-    In flight the ball falls freely and leaves the ground with e times the speed it came with. In the
-    hand its acceleration is -g - k t: the push grows from nothing, so the hand never has to pull.
+    In flight the ball falls freely and leaves the ground with e times the speed it came with. In
+    the hand its acceleration is -g - k t: the push grows from nothing, so the hand never has to
+    pull.
     """
     fall = style.release_height - radius
     impact = np.sqrt(v**2 + 2.0 * GRAVITY * fall)
@@ -202,7 +204,7 @@ def _legs(model, joint_q, style: Dribble) -> None:
         ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])
         foot = Rotation.from_euler("z", out, degrees=True)
         knee_axis = foot.apply([0.0, 1.0, 0.0])
-        _place(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
+        pose.place_limb(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
 
 
 def _left_arm(model, joint_q, phase) -> None:
@@ -232,21 +234,4 @@ def _right_arm(model, joint_q, under, radius: float, tilt, roll: float) -> None:
     palm = under + radius * turn.apply([0.0, 0.0, 1.0])
     wrist = palm - turn.apply(centre)
     elbow_axis = np.array([0.35, -0.80, 0.50])
-    _place(model, joint_q, "r_elbow", wrist, turn, elbow_axis)
-
-
-def _place(model, joint_q, hinge: str, end, end_turn: Rotation, axis) -> None:
-    """Solve a limb, in place: the body beyond the hinge's ends at `end` [m] with the world
-    rotation `end_turn`."""
-    upper, lower, last = pose.limb_bodies(model, hinge)
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
-    limb = pose.Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
-    now = pose.forward(model, joint_q)
-    frames = len(joint_q)
-    end, axis = np.broadcast_to(end, (frames, 3)), np.tile(axis, (frames, 1))
-    turn, angle = limb.solve(now[:, upper, :3], end, axis)
-    parent = Rotation.from_quat(now[:, model.body_parent[upper], 3:])
-    joint_q[:, model.q_slice(pose.body_joint(model, upper))] = (parent.inv() * turn).as_quat()
-    joint_q[:, model.q_slice(hinge)] = angle[:, None]
-    beyond = turn * Rotation.from_rotvec(angle[:, None] * model.joint_axis(hinge))
-    joint_q[:, model.q_slice(pose.body_joint(model, last))] = (beyond.inv() * end_turn).as_quat()
+    pose.place_limb(model, joint_q, "r_elbow", wrist, turn, elbow_axis)

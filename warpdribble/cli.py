@@ -8,8 +8,8 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -53,6 +53,10 @@ class Demo:
 
 
 ABOUT = "Recorded motion becomes a simulated basketball player. Also: warpdribble bench."
+LONGEST = 600.0
+"""[s] of one take."""
+SHORT = 60.0
+"""[s] up to which several starts of the ball are tried: all of them are kept in memory."""
 COMMANDS = OmitSubcommandPrefixes[
     Annotated[Simulate, subcommand("simulate")] | Annotated[Demo, subcommand("demo")]
 ]
@@ -124,6 +128,8 @@ def _bench(arguments: list[str]) -> int:
 def _run(command: Simulate | Demo) -> int:
     if command.repeat < 1:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
+    if not re.fullmatch(r"cpu|cuda(:\d+)?", command.device):
+        raise ValueError(f"--device {command.device}: give cpu, cuda or cuda:0, cuda:1, ...")
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -143,9 +149,11 @@ def _demo(command: Demo, model) -> int:
     from .simulate import ball_in_reference
 
     clip = dribble_right(model)
-    cycle = Cycle(clip.reference)
+    _check_length(clip.reference, command.repeat)
+    reference = Cycle(clip.reference).repeat(model, command.repeat)
+    ball = ball_in_reference(model, reference)
     say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle")
-    _finish(command, model, cycle, ball_in_reference(model, clip.reference), "authored dribble")
+    _finish(command, model, reference, ball, "authored dribble")
     say(
         "next      open the take in Blender (or any USD viewer), or let the player follow your own "
         "clip:\n          warpdribble simulate CLIP.bvh --repeat 10"
@@ -154,33 +162,43 @@ def _demo(command: Demo, model) -> int:
 
 
 def _simulate(command: Simulate, model) -> int:
+    from .sims.reference import close_cycle
     from .simulate import ball_from_hand, dribbling_hand, load_clip
 
-    cycle, notes = load_clip(model, command.clip, command.frames)
+    reference, notes = load_clip(model, command.clip, command.frames)
+    _check_length(reference, command.repeat)
     first, last = command.frames
     part = f"frames {first} to {'the last' if last < 0 else last}"
-    say(f"clip      {command.clip}, {part}, {cycle.reference.duration:.2f} s")
+    say(f"clip      {command.clip}, {part}, {reference.duration:.2f} s")
     for note in notes:
         say(f"          {note}")
     if command.repeat > 1:
-        say(f"          the ends are {57.3 * cycle.gap:.1f} degrees per joint apart: closed")
+        cycle = close_cycle(model, reference)
+        reference = cycle.repeat(model, command.repeat)
+        say(f"          its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
     ball = None
     if "ball" in model.body_names:
-        hand = dribbling_hand(model, cycle.reference)
-        ball = ball_from_hand(model, cycle.reference, hand)
-    _finish(command, model, cycle, ball, str(command.clip))
+        ball = ball_from_hand(model, reference, dribbling_hand(model, reference))
+    _finish(command, model, reference, ball, f"{command.clip.name}, {part}")
     return 0
 
 
-def _finish(command: Simulate | Demo, model, cycle, ball, source: str) -> None:
+def _check_length(reference, repeat: int) -> None:
+    """Raise ValueError where a take would not fit into memory."""
+    most = max(1, int(LONGEST / reference.duration))
+    if repeat > most:
+        raise ValueError(f"--repeat {repeat}: at most {most} for this clip ({LONGEST:.0f} s)")
+
+
+def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> None:
     """Simulate, say how it went, and write the take and its picture."""
     from . import __version__
     from .sheet import write_sheet
     from .simulate import TRIES, simulate
     from .take import Take, validate, write_take
 
-    reference = cycle.repeat(model, command.repeat)
-    sim = _ready(model, TRIES if ball is not None else 1, command.device)
+    tries = TRIES if ball is not None and reference.duration < SHORT else 1
+    sim = _ready(model, tries, command.device)
     with _bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
         run = simulate(sim, reference, command.root, ball, progress)
     _summary(run, command)
@@ -236,7 +254,10 @@ def _ready(model, worlds: int, device: str):
     from .sims import Simulation
 
     waiting = "compiling kernels (once; about a minute the first time, then cached) ..."
-    with Console(stderr=True).status(waiting):
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        print(waiting, file=sys.stderr, flush=True)
+    with console.status(waiting):
         sim = Simulation(model, world_count=worlds, device=device)
         sim.step(1)
         sim.reset()
@@ -249,11 +270,7 @@ def _bar(label: str, total: int):
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(label, total=total)
-
-        def report(done: int) -> None:
-            bar.update(task, completed=done)
-
-        done: Callable[[int], None] = report
-        yield done
+        yield lambda done: bar.update(task, completed=done)

@@ -106,7 +106,8 @@ def _lines() -> Mesh:
     sheets = [_sheet(low, high, -0.002) for low, high in (*along, *across)]
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:-1]
     ring = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-    points = np.concatenate([(1.8 - w) * ring, (1.8 + w) * ring]) + [0.0, 0.0, -0.001]
+    points = np.concatenate([(1.8 - w) * ring, (1.8 + w) * ring])
+    points[:, 2] = -0.001
     i = np.arange(96)
     j = (i + 1) % 96
     faces = np.concatenate(

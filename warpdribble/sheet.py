@@ -76,7 +76,7 @@ def _draw_poses(axes, take: Take, frames, times) -> None:
         drawn.sort(key=lambda d: d[0])
         patches, colours = [], []
         for depth, outline, rgba in drawn:
-            paler = np.clip(0.35 - depth, 0.0, 0.45)
+            paler = np.clip(0.05 - depth, 0.0, 0.4)
             patches.append(_patch(outline, number * SPACING))
             colours.append((1.0 - paler) * np.asarray(rgba[:3]) + paler)
         axes.add_collection(

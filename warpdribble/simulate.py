@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from .bvh import ClipError, read_bvh
 from .sims import gaps, pose
 from .sims.feedforward import leading_targets
-from .sims.reference import Cycle, Reference, close_cycle, difference, root_joint
+from .sims.reference import Reference, difference, root_joint
 from .sims.retarget import CMU, retarget
+from .sims.simulation import NONFINITE
 
 ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
 """Virtual gains of a tracked root: [N/m], [N s/m], [N m/rad], [N m s/rad]. The rates are a tenth
@@ -72,8 +73,8 @@ class Run:
         return self.reference.duration / max(self.wall_time, 1e-9)
 
 
-def load_clip(model, path: str | Path, frames=(0, -1)) -> tuple[Cycle, list[str]]:
-    """A recorded clip as a closed cycle on the model, and notes.
+def load_clip(model, path: str | Path, frames=(0, -1)) -> tuple[Reference, list[str]]:
+    """A recorded clip on the model, and notes.
 
     frames: (first, last), both included; a last of -1 is the clip's. Raises ClipError.
     """
@@ -97,7 +98,7 @@ def load_clip(model, path: str | Path, frames=(0, -1)) -> tuple[Cycle, list[str]
             f"{', ...' if len(missing) > 4 else ''}; "
             f"the clip has {', '.join(motion.joint_names[:6])}, ...",
         )
-    return close_cycle(model, retarget(model, motion)), notes
+    return retarget(model, motion), notes
 
 
 def dribbling_hand(model, reference: Reference) -> str:
@@ -111,7 +112,8 @@ def ball_from_hand(model, reference: Reference, hand: str) -> BallStart:
     """A ball that touches the palm from below at the first row.
 
     With the hand in the upper half of its stroke the ball moves with it, and is the hand's to push;
-    below, it has left the hand, downward and at least fast enough to come back to this height.
+    below, it has left the hand, going along with the player, downward and at least fast enough to
+    come back to this height.
     """
     body, ball = model.body(hand), model.body("ball")
     body_q = pose.forward(model, reference.joint_q)
@@ -126,7 +128,8 @@ def ball_from_hand(model, reference: Reference, hand: str) -> BallStart:
         bounce = _shape(model, ball).restitution
         fall = max(heights[0] - radius, 0.0)
         comes_back = np.sqrt(2.0 * 9.81 * fall * (1.0 / bounce**2 - 1.0))
-        velocity = np.array([0.0, 0.0, -max(-velocity[2], comes_back + 0.5)])
+        along = reference.velocity(model)[0, model.dof_slice(root_joint(model))][:2]
+        velocity = np.array([*along, -max(-velocity[2], comes_back + 0.5)])
     return BallStart(places[0], velocity)
 
 
@@ -147,10 +150,9 @@ def simulate(
     """Track a reference in every world of `sim`; the run of the world whose ball stays in play
     longest.
 
-    World 0 starts with the ball as given, the others with small, fixed variations of it. Targets
-    lead the reference by damping/stiffness of each joint, since a drive damps the velocity that the
-    reference asks for. progress: called with the number of steps done. Raises FloatingPointError
-    when the state becomes non-finite.
+    World 0 starts with the ball as given, the others with small, fixed variations of it. progress:
+    called with the number of steps done. Raises FloatingPointError when the state becomes
+    non-finite.
     """
     model = sim.model
     worlds = sim.world_count
@@ -176,12 +178,13 @@ def simulate(
         body_q[row] = sim.body_q
         if progress and row % 20 == 0:
             progress(row)
-    if not np.isfinite(states).all():
-        row = int(np.argmin(np.isfinite(states).all(axis=(1, 2))))
+    sound = sim.status & NONFINITE == 0
+    if not sound.any():
         raise FloatingPointError(
-            f"the simulation broke down at {row * reference.timestep:.2f} s (non-finite state)"
+            "the simulation broke down (non-finite state); try --root tracked, or another clip"
         )
-    best = int(np.argmax(_time_in_play(model, body_q))) if ball is not None else 0
+    time_in_play = _time_in_play(model, body_q) if ball is not None else np.zeros(worlds)
+    best = int(np.argmax(np.where(sound, time_in_play, -1.0)))
     return _measure(model, reference, body_q[:, best], states[:, best], wall_time)
 
 
@@ -241,15 +244,23 @@ def _contacts(model, body_q) -> dict[str, np.ndarray]:
     if "ball" in model.body_names:
         ball = model.body("ball")
         centre, radius = body_q[:, ball, :3], _shape(model, ball).size[0]
-        contacts["ball on ground"] = centre[:, 2] - radius < TOUCH
+        contacts["ball on ground"] = _touches(centre[:, 2] - radius)
         for name, body in _named(model, {"right hand": "r_hand", "left hand": "l_hand"}):
             hand = gaps.descendants(model, body)
             gap = gaps.gap_to_bodies(model, body_q, hand, centre) - radius
-            contacts[f"ball on {name}"] = gap < TOUCH
+            contacts[f"ball on {name}"] = _touches(gap)
     for name, body in _named(model, {"right foot": "r_foot", "left foot": "l_foot"}):
         foot = gaps.descendants(model, body)
         contacts[f"{name} down"] = gaps.lowest_point(model, body_q, foot) < TOUCH
     return contacts
+
+
+def _touches(gap: np.ndarray) -> np.ndarray:
+    """Where a gap (frames,) [m] is closed, also between two frames."""
+    turns = np.zeros(len(gap), bool)
+    turns[1:-1] = (gap[1:-1] <= gap[:-2]) & (gap[1:-1] <= gap[2:])
+    reach = np.maximum(np.abs(np.diff(gap, prepend=gap[:1])), np.abs(np.diff(gap, append=gap[-1:])))
+    return (gap < TOUCH) | (turns & (gap < TOUCH + reach))
 
 
 def _named(model, names: dict[str, str]) -> list[tuple[str, int]]:

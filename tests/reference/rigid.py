@@ -251,49 +251,77 @@ class Rigid:
         turn = quat_log(quat_mul(quat_inv(q[k + 3 : k + 7]), to[k + 3 : k + 7]))
         return np.r_[to[k : k + 3] - q[k : k + 3], turn]
 
-    def drive(self, q, v, target, h, drives):
-        """Drive force and what it puts on the diagonal: h (kd + h kp), or nothing where it is clamped.
-        A ball joint is clamped by the length of its torque, a free joint by those of force and torque."""
-        f, load = np.zeros(self.m.nv), np.zeros(self.m.nv)
+    def pull(self, q, v, target, h, drives):
+        """Torque of all drives at the end of the step, for the velocity v then: no effort limit."""
+        f = np.zeros(self.m.nv)
         for link in self.links:
-            if link.kind == WELD:
-                continue
-            kp, kd = drives.kp[link.dofs], drives.kd[link.dofs]
-            pull = kp * self.away(link, q, target) - (kd + h * kp) * v[link.dofs]
-            put = h * (kd + h * kp)
-            for part in (slice(0, 3), slice(3, 6)):
-                length = np.linalg.norm(pull[part])
-                if length > drives.effort[link.joint]:
-                    pull[part] *= drives.effort[link.joint] / length
-                    put[part] = 0.0
-            f[link.dofs], load[link.dofs] = pull, put
-        return f, load
+            if link.kind != WELD:
+                f[link.dofs] = drives.kp[link.dofs] * self.away(link, q, target)
+        return f - (drives.kd + h * drives.kp) * v
 
-    def spring(self, q):
-        """Passive stiffness: torque now, and the coefficient of each dof."""
-        f, k = np.zeros(self.m.nv), np.zeros(self.m.nv)
+    def stiffness(self):
+        """Of passive springs, per dof."""
+        k = np.zeros(self.m.nv)
         for link in self.links:
             if link.kind in (BALL, HINGE):
-                c = self.m.jnt_stiffness[link.joint]
-                f[link.dofs] = c * self.away(link, q, self.m.qpos_spring)
-                k[link.dofs] = c
-        return f, k
+                k[link.dofs] = self.m.jnt_stiffness[link.joint]
+        return k
 
-    def system(self, q, v, target, h, drives, joint_f=0.0, force=None):
-        """Mh and the free velocity v* = v + Mh^-1 h f of the implicit step."""
+    def spring(self, q, v, h):
+        """Passive springs' force at q + h v."""
+        f = -h * self.stiffness() * v
+        for link in self.links:
+            if link.kind in (BALL, HINGE):
+                f[link.dofs] += self.m.jnt_stiffness[link.joint] * self.away(link, q, self.m.qpos_spring)
+        return f
+
+    def passive(self, q, v, h, joint_f=0.0, force=None):
+        """All but the drives at q, v: force, and the matrix that multiplies the change of v."""
         p = self.pose(q, v)
-        drive, load = self.drive(q, v, target, h, drives)
-        spring, k = self.spring(q)
         damping = self.m.dof_damping
-        Mh = self.mass_matrix(p) + np.diag(self.m.dof_armature + load + h * damping + h * h * k)
-        f = -self.bias(p) + drive - damping * v + spring - h * k * v + joint_f
+        f = joint_f - self.bias(p) - damping * v + self.spring(q, v, h)
         if force is not None:
             f = f + self.external(p, force)
-        return Mh, v + np.linalg.solve(Mh, h * f)
+        extra = self.m.dof_armature + h * damping + h * h * self.stiffness()
+        return f, self.mass_matrix(p) + np.diag(extra)
+
+    def system(self, q, v, target, h, drives, joint_f=0.0, force=None):
+        """Mh = M + armature + h kd + h^2 kp + ..., and the free velocity v* = v + Mh^-1 h f of the
+        implicit step. Effort limits do not count."""
+        f, M = self.passive(q, v, h, joint_f, force)
+        Mh = M + np.diag(h * (drives.kd + h * drives.kp))
+        return Mh, v + np.linalg.solve(Mh, h * (f + self.pull(q, v, target, h, drives)))
+
+    def exerted(self, q, v, after, h, joint_f=0.0, force=None):
+        """Torque that the drives have exerted in a step that led from v to `after`, by inverse dynamics,
+        and what a relative error of 1e-6 in the velocities makes of it."""
+        f, M = self.passive(q, v, h, joint_f, force)
+        return M @ (after - v) / h - f, 1e-6 * np.abs(M) @ (np.abs(after) + np.abs(v)) / h
+
+    def obeys_effort_limits(self, q, v, after, target, h, drives, joint_f=0.0, force=None):
+        """Per driven joint, whether a step kept the drives' law: the torque is what the drive's gains
+        ask for at the end of the step, within the limit; or it is at the limit, where the gains ask
+        for more, the same way. Returns that, and whether it is at the limit."""
+        torque, error = self.exerted(q, v, after, h, joint_f, force)
+        asked = self.pull(q, after, target, h, drives)
+        good, full = [], []
+        for link in self.links:
+            J = link.dofs
+            if link.kind not in (BALL, HINGE) or not drives.kp[J].any():
+                continue
+            limit, tolerance = drives.effort[link.joint], 10 * error[J].max() + 1e-4
+            tolerance += 1e-4 * min(limit, np.linalg.norm(asked[J]))
+            length = np.linalg.norm(torque[J])
+            free = np.abs(torque[J] - asked[J]).max() <= tolerance and length <= limit + tolerance
+            at_limit = abs(length - limit) <= tolerance and torque[J] @ asked[J] > 0
+            at_limit = at_limit and np.linalg.norm(asked[J]) >= limit - tolerance
+            good.append(free or at_limit)
+            full.append(at_limit and not free)
+        return np.array(good, bool), np.array(full, bool)
 
     def step(self, q, v, target, h, drives, joint_f=0.0, force=None):
-        """q+, v+ of one step without contacts and limits."""
-        _, v = self.system(q, v, target, h, drives, joint_f, force)
+        """q+, v+ of one step without contacts, joint limits and effort limits."""
+        v = self.system(q, v, target, h, drives, joint_f, force)[1]
         return self.integrate(q, v, h), v
 
     def integrate(self, q, v, h):

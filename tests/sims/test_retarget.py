@@ -21,6 +21,10 @@ PLACES |= {"torso": "Spine1", "head": "Neck1", "l_hand": "LeftFingerBase"}
 PLACES |= {"r_lower_leg": "RightLeg", "r_hand": "RightFingerBase"}
 
 
+def soles(model):
+    return [model.body(f"{side}_{part}") for side in "lr" for part in ("foot", "toes")]
+
+
 @pytest.fixture(scope="module")
 def player():
     return Model.load("player")
@@ -67,7 +71,7 @@ def test_feet_stand_on_the_ground(player, mocap, clip, frames):
     motion, _ = read_bvh(mocap / "cmu" / f"{clip}.bvh")
     reference = retarget(player, motion.slice(*frames))
     body_q = pose.forward(player, reference.joint_q)
-    lowest = gaps.lowest_point(player, body_q, [player.body(name) for name in CMU.soles])
+    lowest = gaps.lowest_point(player, body_q, soles(player))
     assert np.median(lowest) == pytest.approx(0.0, abs=0.03)
     assert lowest.min() > -0.05
 

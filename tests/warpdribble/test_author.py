@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpdribble.author import Dribble, ball_flight, dribble_right
+from warpdribble.author import Dribble, dribble_right, release_speed
 from warpdribble.sims import Model, gaps, pose
 from warpdribble.sims.reference import difference
 
@@ -27,7 +27,7 @@ def body_q(player, clip):
 def test_the_last_row_is_the_first(player, clip):
     first, last = clip.reference.joint_q[[0, -1]]
     assert np.array_equal(first, last)
-    assert clip.reference.duration == pytest.approx(0.72)
+    assert clip.reference.duration == pytest.approx(0.70)
 
 
 def test_it_is_the_same_every_time(player, clip):
@@ -46,7 +46,7 @@ def test_feet_are_planted_flat(player, body_q):
 
 def test_the_hand_stays_within_a_dribble_s_heights(player, body_q):
     hand = body_q[:, player.body("r_hand"), 2]
-    assert 0.75 < hand.min() < 0.9 and 1.0 < hand.max() < 1.15
+    assert 0.75 < hand.min() < 0.9 and 1.0 < hand.max() < 1.2
 
 
 def test_the_ball_obeys_gravity_and_the_bounce(player, clip, body_q):
@@ -64,13 +64,19 @@ def test_the_ball_obeys_gravity_and_the_bounce(player, clip, body_q):
 
 
 def test_the_palm_is_on_the_ball_while_the_hand_has_it(player, clip, body_q):
-    hand = gaps.descendants(player, player.body("r_hand"))
     centre = body_q[:, player.body("ball"), :3]
-    gap = gaps.gap_to_bodies(player, body_q, hand, centre) - 0.1193
+    gap = gaps.gap_to_bodies(player, body_q, [player.body("r_hand")], centre) - 0.1193
     times = np.arange(len(gap)) * player.timestep
     held = (times > clip.contact[0]) | (times == 0.0)
-    assert np.abs(gap[held]).max() < 0.012
-    assert gap[times < clip.contact[0]].max() > 0.3
+    assert np.abs(gap[held]).max() < 0.002
+    assert gap[~held].min() > -0.002 and gap[~held].max() > 0.3
+
+
+def test_the_hand_pushes_and_never_pulls(player, clip, body_q):
+    height = body_q[:, player.body("ball"), 2]
+    fall = np.diff(height, 2) / player.timestep**2
+    held = slice(round(clip.contact[0] / player.timestep) + 1, -1)
+    assert np.all(fall[held] < -9.8)
 
 
 def test_no_joint_jumps_or_leaves_its_range(player, clip):
@@ -97,11 +103,12 @@ def test_the_motion_is_smooth_over_the_seam(player, clip):
     assert change[seam - 3 : seam + 3].max() < 4.0
 
 
-def test_a_ball_that_does_not_come_back_is_refused(player):
-    with pytest.raises(ValueError, match="does not come back"):
-        dribble_right(player, replace(Dribble(), release_speed=0.5))
+@pytest.mark.parametrize("change", [{"hold": 0.69}, {"restitution": 0.2}])
+def test_a_dribble_that_no_ball_can_do_is_refused(player, change):
+    with pytest.raises(ValueError, match="this dribble"):
+        dribble_right(player, replace(Dribble(), **change))
 
 
-def test_flight_of_a_perfect_ball_is_symmetric():
-    down, up, back = ball_flight(1.0, 2.0, 1.0, 0.12)
-    assert (down, back) == (pytest.approx(up), pytest.approx(2.0))
+def test_a_livelier_ball_needs_less_of_a_push():
+    dull, lively = (release_speed(replace(Dribble(), restitution=e), 0.1193) for e in (0.7, 0.9))
+    assert 0.0 < lively < dull < 8.0

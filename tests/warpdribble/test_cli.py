@@ -1,0 +1,142 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from warpdribble.cli import main
+from warpdribble.take import validate
+
+ROOT = Path(__file__).resolve().parents[2]
+
+UNSUPPORTED = """<mujoco><worldbody><body name="a"><freejoint/>
+<geom type="sphere" size=".1"/><body><joint type="slide" name="rail"/>
+<geom type="sphere" size=".1"/></body></body></worldbody></mujoco>"""
+OTHER = """<mujoco><worldbody><body name="thing"><freejoint name="root"/>
+<geom type="sphere" size=".1"/></body></worldbody></mujoco>"""
+
+
+def refused(capsys, tmp_path, *arguments, allowed=()):
+    """The one line on stderr of a command that has to fail with status 2 and leave no file."""
+    before = {p for p in tmp_path.rglob("*")}
+    assert main([str(a) for a in arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("warpdribble: "), said
+    assert "Traceback" not in said
+    new = {p for p in tmp_path.rglob("*") if p.is_file()} - before
+    assert not new - set(allowed)
+    return said
+
+
+def test_missing_clip(capsys, tmp_path):
+    said = refused(capsys, tmp_path, "simulate", tmp_path / "no.bvh", "--out", tmp_path / "t.usdc")
+    assert "no.bvh" in said and "no such file" in said
+
+
+def test_broken_clip(capsys, tmp_path, cmu_clip):
+    text = cmu_clip.read_text()
+    cmu_clip.write_text(text[: len(text) // 2])
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--out", tmp_path / "t.usdc")
+    assert "broken BVH" in said
+
+
+def test_unknown_joint(capsys, tmp_path, cmu_clip):
+    cmu_clip.write_text(cmu_clip.read_text().replace("RightArm", "Elbow"))
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--out", tmp_path / "t.usdc")
+    assert "unknown joints" in said and "RightArm" in said
+
+
+@pytest.mark.parametrize("frames", [("50", "20"), ("0", "9999"), ("-5", "20")])
+def test_wrong_frame_range(capsys, tmp_path, cmu_clip, frames):
+    out = tmp_path / "t.usdc"
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--frames", *frames, "--out", out)
+    assert "--frames" in said and "0 to 120" in said
+
+
+@pytest.mark.parametrize("repeat", ["0", "-3", "many", "2.5", "100000"])
+def test_wrong_repeat(capsys, tmp_path, cmu_clip, repeat):
+    out = tmp_path / "t.usdc"
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--repeat", repeat, "--out", out)
+    assert "--repeat" in said
+
+
+@pytest.mark.parametrize("name", ["take.fbx", "take", "file/take.usda", "folder.usda"])
+def test_unwritable_output(capsys, tmp_path, name):
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "folder.usda").mkdir()
+    said = refused(capsys, tmp_path, "demo", "--out", tmp_path / name)
+    assert name in said
+
+
+def test_unsupported_model_element(capsys, tmp_path, cmu_clip):
+    model = tmp_path / "rail.xml"
+    model.write_text(UNSUPPORTED)
+    out = tmp_path / "t.usdc"
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--model", model, "--out", out)
+    assert "rail" in said and "not supported" in said
+
+
+def test_model_without_the_player_s_bodies(capsys, tmp_path, cmu_clip):
+    model = tmp_path / "other.xml"
+    model.write_text(OTHER)
+    out = tmp_path / "t.usdc"
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--model", model, "--out", out)
+    assert "no joint 'l_elbow'" in said
+
+
+def test_missing_model(capsys, tmp_path, cmu_clip):
+    out = tmp_path / "t.usdc"
+    said = refused(capsys, tmp_path, "simulate", cmu_clip, "--model", "no.xml", "--out", out)
+    assert "no.xml" in said
+
+
+def test_unknown_device(capsys, tmp_path):
+    said = refused(capsys, tmp_path, "demo", "--device", "abacus", "--out", tmp_path / "t.usdc")
+    assert "abacus" in said
+
+
+def test_a_device_that_is_not_there_is_refused_without_noise(tmp_path):
+    command = [sys.executable, "-m", "warpdribble", "demo", "--device", "abacus"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("fly",), ("simulate",), ("demo", "--speed", "3"), ("demo", "--root", "flying")],
+)
+def test_commands_that_are_not_understood(capsys, tmp_path, arguments):
+    assert "--help" in refused(capsys, tmp_path, *arguments)
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("simulate", "--help"), ("demo", "-h")])
+def test_help_is_given(capsys, arguments):
+    assert main(list(arguments)) == 0
+    assert "usage: warpdribble" in capsys.readouterr().out
+
+
+def test_demo_leaves_a_valid_take_and_a_picture(capsys, tmp_path):
+    out = tmp_path / "new" / "demo.usdc"
+    assert main(["demo", "--repeat", "2", "--out", str(out)]) == 0
+    assert validate(out) == []
+    assert sorted(p.name for p in out.parent.iterdir()) == ["demo.png", "demo.usdc"]
+    said = capsys.readouterr().out
+    for word in ("real time", "tracking", "falls", "bounces", "next", str(out)):
+        assert word in said
+
+
+def test_a_clip_becomes_a_valid_take(capsys, tmp_path, cmu_clip):
+    out = tmp_path / "out" / "take.usdz"
+    arguments = ["simulate", cmu_clip, "--frames", "0", "120", "--repeat", "2", "--root", "tracked"]
+    assert main([str(a) for a in [*arguments, "--out", out]]) == 0
+    assert validate(out) == []
+    said = capsys.readouterr().out
+    assert "lost bone lengths" in said and "root tracked" in said
+
+
+def test_the_module_runs_as_a_program(tmp_path):
+    command = [sys.executable, "-m", "warpdribble", "simulate", "nowhere.bvh"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr == "warpdribble: nowhere.bvh: no such file\n"
