@@ -18,7 +18,6 @@ from .mujoco import SETTINGS, MuJoCo
 from .ours import Ours, solver_error
 from .scene import hold
 
-
 HELD = 20
 """Fragments before every side starts again, so that the ball stays in the hand."""
 

@@ -19,50 +19,7 @@ import warp as wp
 
 from .drive import Push, judge, pd, spring, stop
 from .kinematics import drift, load3, load4, store3
-from .lanes import (
-    Real,
-    add,
-    any_lt,
-    div,
-    fill,
-    least,
-    most,
-    mul,
-    neg,
-    root,
-    size,
-    sub,
-    where_lt,
-)
-from .spatial import (
-    Force,
-    Inertia,
-    Motion,
-    Quat,
-    Vec3,
-    add,
-    column,
-    conjugate,
-    dot,
-    downdate,
-    frame,
-    logarithm,
-    mul,
-    mul_t,
-    neg,
-    norm,
-    rotate,
-    row,
-    shift_force,
-    shift_inertia,
-    shift_motion,
-    slide,
-    sub,
-    turn,
-    unit3,
-    where_lt,
-    zero3,
-)
+from .spatial import *
 from .tree import BALL, FREE, GROUND, HINGE, Tree, World
 
 
@@ -70,7 +27,7 @@ from .tree import BALL, FREE, GROUND, HINGE, Tree, World
 class Body:
     """What is left of a link while its dofs are taken out, last first."""
 
-    I: Inertia  # noqa: E741
+    I: Inertia
     p: Force
     V: Motion
     """velocity that the dofs still to come give"""
@@ -213,7 +170,7 @@ def factorize(tree: Tree, world: World, g: int):
     for k in range(tree.link_count):
         i = tree.link_count - k
         joint = tree.link_joint[i]
-        I = world.I[g, i]  # noqa: E741
+        I = world.I[g, i]
         parent = tree.link_parent[i]
         b = Body(I, world.p[g, i] + I * drift(world, g, i, parent), world.V[g, i])
         if joint == HINGE:

@@ -11,8 +11,7 @@ import warp as wp
 
 from .collide import Touch
 from .kinematics import load3, store3
-from .lanes import Real, add, div, fill, least, most, mul, neg, root, sub, where_lt
-from .spatial import Vec3, add, cross, dot, mul, neg, norm, sub, where_lt, zero3
+from .spatial import *
 from .tree import Tree, World
 
 BOUNCE_SPEED = wp.constant(0.1)

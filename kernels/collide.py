@@ -2,26 +2,8 @@
 
 import warp as wp
 
-from .lanes import Real, add, div, fill, least, most, mul, neg, root, size, sub, where_lt
-from .spatial import (
-    Quat,
-    Vec3,
-    add,
-    cross,
-    dot,
-    mul,
-    mul_t,
-    neg,
-    norm,
-    quat,
-    rotate,
-    rotation,
-    sub,
-    vec3,
-    where_lt,
-    zero3,
-)
-from .tree import CAPSULE_CAPSULE, POINT_PLANE, SPHERE_BOX, SPHERE_CAPSULE, Tree, World
+from .spatial import *
+from .tree import POINT_PLANE, SPHERE_BOX, SPHERE_CAPSULE, Tree, World
 
 
 @wp.struct

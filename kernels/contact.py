@@ -10,24 +10,8 @@ import warp as wp
 
 from .bounce import BOUNCE_SPEED, bounce
 from .collide import Touch, probe
-from .lanes import Real, add, any_lt, div, fill, least, most, mul, neg, root, size, sub, where_lt
 from .rows import rows_change, rows_velocity
-from .spatial import (
-    Force,
-    Mat3,
-    Sym3,
-    Vec3,
-    add,
-    cross,
-    dot,
-    frame,
-    mul,
-    neg,
-    norm,
-    sub,
-    where_lt,
-    zero3,
-)
+from .spatial import *
 from .tree import BALL, FREE, HINGE, Tree, World
 
 NEVER = wp.constant(-1.0e9)
@@ -76,7 +60,7 @@ def wrenches(axes: Mat3, at: Vec3, sign: float) -> Wrenches:
 
 
 @wp.func
-def add(a: Wrenches, b: Wrenches) -> Wrenches:  # noqa: F811
+def add(a: Wrenches, b: Wrenches) -> Wrenches:
     return Wrenches(a.nx + b.nx, a.ny + b.ny, a.nz + b.nz, a.fx + b.fx, a.fy + b.fy, a.fz + b.fz)
 
 

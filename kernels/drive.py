@@ -12,8 +12,7 @@ too light to be judged by the torque at the start, and would be thrown from one 
 
 import warp as wp
 
-from .lanes import Real, add, div, fill, least, most, mul, neg, size, sub, where_lt
-from .spatial import Vec3, add, dot, mul, norm, sub, where_lt
+from .spatial import *
 from .tree import Tree, World
 
 # A joint past its limit, or about to be, gets a spring and damper this many times as stiff as the
@@ -58,7 +57,7 @@ def pd(tree: Tree, k: int, pull: Vec3, v: Vec3, full: Real, torque: Vec3) -> Dri
 
 
 @wp.func
-def pd(tree: Tree, k: int, pull: Real, v: Real, full: Real, torque: Real) -> Push:  # noqa: F811
+def pd(tree: Tree, k: int, pull: Real, v: Real, full: Real, torque: Real) -> Push:
     """The same for one dof."""
     h = tree.h
     b = tree.dof_kd[k] + h * tree.dof_kp[k]
@@ -103,7 +102,7 @@ def spring(tree: Tree, k: int, d: Drive, error: Vec3, v: Vec3) -> Drive:
 
 
 @wp.func
-def spring(tree: Tree, k: int, d: Push, error: Real, v: Real) -> Push:  # noqa: F811
+def spring(tree: Tree, k: int, d: Push, error: Real, v: Real) -> Push:
     h = tree.h
     c = tree.dof_stiffness[k]
     return Push(d.force + c * (error - h * v), d.load + h * h * c)

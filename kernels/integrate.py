@@ -3,8 +3,7 @@
 import warp as wp
 
 from .kinematics import load3, load4, store3
-from .lanes import Real, add, fill, mul, where_lt
-from .spatial import Quat, Vec3, add, exponential, mul, normalize
+from .spatial import *
 from .tree import BALL, FREE, Tree, World
 
 

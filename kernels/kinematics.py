@@ -2,28 +2,8 @@
 
 import warp as wp
 
-from .lanes import Real, add, fill, mul, neg, sub
-from .spatial import (
-    Force,
-    Motion,
-    Quat,
-    Sym3,
-    Vec3,
-    about,
-    add,
-    cross,
-    mul,
-    mul_t,
-    neg,
-    quat,
-    rigid,
-    rotate,
-    rotation,
-    sub,
-    vec3,
-    zero3,
-)
-from .tree import BALL, FREE, HINGE, Tree, World
+from .spatial import *
+from .tree import BALL, FREE, Tree, World
 
 
 @wp.func
@@ -100,7 +80,7 @@ def inertias(tree: Tree, world: World, g: int):
         P = tree.link_products[i]
         mass = k * tree.link_mass[i]
         com = rotate(R, tree.link_com[i])
-        I = rigid(  # noqa: E741
+        I = rigid(
             R, mass, com, Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2])
         )
         w = world.V[g, i].w

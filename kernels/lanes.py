@@ -5,7 +5,8 @@ which LLVM does not vectorise across worlds by itself, so there `Real` is a vect
 (16 with AVX-512, 8 with AVX2, 4 with SSE or NEON) and one pass of a kernel steps that many at once.
 
 Warp looks for `add`, `sub`, `mul` and `div` in a kernel's own module before its built-ins: a module that
-imports them from here writes `a * b + c` for lanes, and for the vectors of lanes in `spatial`.
+imports them (`from .spatial import *` brings all operators) writes `a * b + c` for lanes, and for the
+vectors of lanes in `spatial`.
 
 A lane that takes no part must compute the same bits as if it were alone, so there are no branches on
 values, only selections: `where_lt(a, b, x, y)` is x in the lanes where a < b, else y.
@@ -58,15 +59,15 @@ def div(a: Real, b: Real) -> Real: ...
 
 
 @wp.func_native("return a + b;")
-def add(a: int, b: int) -> int: ...  # noqa: F811
+def add(a: int, b: int) -> int: ...
 
 
 @wp.func_native("return a - b;")
-def sub(a: int, b: int) -> int: ...  # noqa: F811
+def sub(a: int, b: int) -> int: ...
 
 
 @wp.func_native("return a * b;")
-def mul(a: int, b: int) -> int: ...  # noqa: F811
+def mul(a: int, b: int) -> int: ...
 
 
 if LANES > 1:  # a Real with a plain number

@@ -8,22 +8,8 @@ import warp as wp
 
 from .collide import probe
 from .kinematics import drift, inertias, kinematics
-from .lanes import Real, add, fill, mul
-from .spatial import (
-    Motion,
-    Vec3,
-    add,
-    column,
-    cross,
-    dot,
-    mul,
-    quat,
-    rotate,
-    shift_force,
-    shift_inertia,
-    unit3,
-)
-from .tree import BALL, FREE, GROUND, HINGE, Tree, World
+from .spatial import *
+from .tree import BALL, GROUND, HINGE, Tree, World
 
 wp.set_module_options(
     {"enable_backward": False, "max_unroll": 3, "cpu_compiler_flags": "-march=native -ffp-contract=fast"}
@@ -115,7 +101,7 @@ def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real))
     for c in range(tree.link_count):
         i = tree.link_count - c
         parent = tree.link_parent[i]
-        I = world.I[g, i]  # noqa: E741
+        I = world.I[g, i]
         if parent != GROUND:
             world.I[g, parent] = world.I[g, parent] + shift_inertia(I, world.r[g, i])
         for k in range(dofs(tree, i)):

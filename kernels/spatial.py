@@ -16,23 +16,7 @@ Algorithms* (2008).
 
 import warp as wp
 
-from .lanes import (
-    LANES,
-    Real,
-    add,
-    div,
-    arc_tangent,
-    fill,
-    least,
-    most,
-    mul,
-    neg,
-    root,
-    sin_cos,
-    size,
-    sub,
-    where_lt,
-)
+from .lanes import *
 
 
 @wp.struct
@@ -121,29 +105,29 @@ def unit3(i: int) -> Vec3:
 
 
 @wp.func
-def add(a: Vec3, b: Vec3) -> Vec3:  # noqa: F811
+def add(a: Vec3, b: Vec3) -> Vec3:
     return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
 
 
 @wp.func
-def sub(a: Vec3, b: Vec3) -> Vec3:  # noqa: F811
+def sub(a: Vec3, b: Vec3) -> Vec3:
     return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @wp.func
-def mul(k: Real, a: Vec3) -> Vec3:  # noqa: F811
+def mul(k: Real, a: Vec3) -> Vec3:
     return Vec3(k * a.x, k * a.y, k * a.z)
 
 
 if LANES > 1:
 
     @wp.func
-    def mul(k: float, a: Vec3) -> Vec3:  # noqa: F811
+    def mul(k: float, a: Vec3) -> Vec3:
         return Vec3(k * a.x, k * a.y, k * a.z)
 
 
 @wp.func
-def neg(a: Vec3) -> Vec3:  # noqa: F811
+def neg(a: Vec3) -> Vec3:
     return Vec3(neg(a.x), neg(a.y), neg(a.z))
 
 
@@ -163,7 +147,7 @@ def norm(a: Vec3) -> Real:
 
 
 @wp.func
-def where_lt(a: Real, b: Real, x: Vec3, y: Vec3) -> Vec3:  # noqa: F811
+def where_lt(a: Real, b: Real, x: Vec3, y: Vec3) -> Vec3:
     return Vec3(where_lt(a, b, x.x, y.x), where_lt(a, b, x.y, y.y), where_lt(a, b, x.z, y.z))
 
 
@@ -171,7 +155,7 @@ def where_lt(a: Real, b: Real, x: Vec3, y: Vec3) -> Vec3:  # noqa: F811
 
 
 @wp.func
-def mul(a: Quat, b: Quat) -> Quat:  # noqa: F811
+def mul(a: Quat, b: Quat) -> Quat:
     return Quat(
         a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
         a.w * b.y + a.y * b.w + a.z * b.x - a.x * b.z,
@@ -252,7 +236,7 @@ def logarithm(q: Quat) -> Vec3:
 
 
 @wp.func
-def mul(R: Mat3, a: Vec3) -> Vec3:  # noqa: F811
+def mul(R: Mat3, a: Vec3) -> Vec3:
     return Vec3(
         R.xx * a.x + R.xy * a.y + R.xz * a.z,
         R.yx * a.x + R.yy * a.y + R.yz * a.z,
@@ -271,7 +255,7 @@ def mul_t(R: Mat3, a: Vec3) -> Vec3:
 
 
 @wp.func
-def mul(S: Sym3, a: Vec3) -> Vec3:  # noqa: F811
+def mul(S: Sym3, a: Vec3) -> Vec3:
     return Vec3(
         S.xx * a.x + S.xy * a.y + S.xz * a.z,
         S.xy * a.x + S.yy * a.y + S.yz * a.z,
@@ -321,32 +305,32 @@ def frame(n: Vec3) -> Mat3:
 
 
 @wp.func
-def add(a: Force, b: Force) -> Force:  # noqa: F811
+def add(a: Force, b: Force) -> Force:
     return Force(a.n + b.n, a.f + b.f)
 
 
 @wp.func
-def sub(a: Force, b: Force) -> Force:  # noqa: F811
+def sub(a: Force, b: Force) -> Force:
     return Force(a.n - b.n, a.f - b.f)
 
 
 @wp.func
-def mul(k: Real, a: Force) -> Force:  # noqa: F811
+def mul(k: Real, a: Force) -> Force:
     return Force(k * a.n, k * a.f)
 
 
 @wp.func
-def dot(V: Motion, F: Force) -> Real:  # noqa: F811
+def dot(V: Motion, F: Force) -> Real:
     return dot(V.w, F.n) + dot(V.v, F.f)
 
 
 @wp.func
-def add(a: Sym3, b: Sym3) -> Sym3:  # noqa: F811
+def add(a: Sym3, b: Sym3) -> Sym3:
     return Sym3(a.xx + b.xx, a.xy + b.xy, a.xz + b.xz, a.yy + b.yy, a.yz + b.yz, a.zz + b.zz)
 
 
 @wp.func
-def add(a: Mat3, b: Mat3) -> Mat3:  # noqa: F811
+def add(a: Mat3, b: Mat3) -> Mat3:
     return Mat3(
         a.xx + b.xx,
         a.xy + b.xy,
@@ -361,30 +345,30 @@ def add(a: Mat3, b: Mat3) -> Mat3:  # noqa: F811
 
 
 @wp.func
-def add(a: Inertia, b: Inertia) -> Inertia:  # noqa: F811
+def add(a: Inertia, b: Inertia) -> Inertia:
     return Inertia(a.A + b.A, a.B + b.B, a.M + b.M)
 
 
 @wp.func
-def mul(I: Inertia, V: Motion) -> Force:  # noqa: E741, F811
+def mul(I: Inertia, V: Motion) -> Force:
     """n = A w + B v, f = B^T w + M v."""
     return Force(I.A * V.w + I.B * V.v, mul_t(I.B, V.w) + I.M * V.v)
 
 
 @wp.func
-def turn(I: Inertia, s: Vec3) -> Force:  # noqa: E741
+def turn(I: Inertia, s: Vec3) -> Force:
     """I times a pure rotation about s."""
     return Force(I.A * s, mul_t(I.B, s))
 
 
 @wp.func
-def slide(I: Inertia, s: Vec3) -> Force:  # noqa: E741
+def slide(I: Inertia, s: Vec3) -> Force:
     """I times a pure translation along s."""
     return Force(I.B * s, I.M * s)
 
 
 @wp.func
-def downdate(I: Inertia, U: Force) -> Inertia:  # noqa: E741
+def downdate(I: Inertia, U: Force) -> Inertia:
     """I - U U^T [7.41]."""
     n = U.n
     f = U.f
@@ -432,7 +416,7 @@ def shift_force(F: Force, r: Vec3) -> Force:
 
 
 @wp.func
-def shift_inertia(I: Inertia, r: Vec3) -> Inertia:  # noqa: E741
+def shift_inertia(I: Inertia, r: Vec3) -> Inertia:
     """I about a point r away, about the nearer point (parallel axes, [2.66])."""
     B = I.B
     M = I.M

@@ -10,8 +10,7 @@ from .contact import HEAD, find, residual, solve  # noqa: F401
 from .drive import LAST_TRIAL
 from .integrate import integrate
 from .kinematics import inertias, kinematics
-from .lanes import Real  # noqa: F401
-from .spatial import Motion  # noqa: F401
+from .spatial import *
 from .tree import Tree, World
 
 wp.set_module_options(

@@ -10,8 +10,7 @@ contiguous on a CPU, and on CUDA, where a group is one world, neighbouring world
 
 import warp as wp
 
-from .lanes import Real
-from .spatial import Force, Inertia, Mat3, Motion, Quat, Vec3
+from .spatial import *
 
 FREE = wp.constant(0)
 BALL = wp.constant(1)

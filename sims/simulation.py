@@ -213,7 +213,7 @@ class Simulation:
             if worlds.shape != (self.world_count,):
                 raise ValueError(f"a mask of worlds must have shape ({self.world_count},)")
             return np.flatnonzero(worlds)
-        if worlds.size and not (0 <= worlds.min() and worlds.max() < self.world_count):
+        if worlds.size and not (worlds.min() >= 0 and worlds.max() < self.world_count):
             raise IndexError(f"worlds must lie in 0 .. {self.world_count - 1}")
         return worlds.astype(int)
 

@@ -10,6 +10,7 @@ from tests.reference.spatial import quat_exp
 from warpdribble.sims import Model, Simulation
 
 H = 0.01
+ACT = "<actuator>{}</actuator>"
 
 ARM = """
 <body pos="0 0 2"><inertial pos="0 0 -0.15" mass="2" diaginertia="0.02 0.02 0.005"/>
@@ -28,7 +29,7 @@ def servo(joint, kp, kv, gear="1 0 0", limit=None):
 
 def beside_mujoco(worldbody, servos, target, steps=200):
     """Trajectories (steps, nq) of the same file here and with MuJoCo's `discrete` integrator."""
-    model = scenes.scene(worldbody, H, rest=f"<actuator>{servos}</actuator>")
+    model = scenes.scene(worldbody, H, rest=ACT.format(servos))
     m = mujoco.MjModel.from_xml_string(
         f'<mujoco><compiler angle="radian"/><option timestep="{H}" integrator="discrete"/>'
         f"<worldbody>{worldbody}</worldbody><actuator>{servos}</actuator></mujoco>"
@@ -116,7 +117,7 @@ ROTOR += '<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>'
 
 def test_effort_limit_of_a_hinge():
     """A saturated drive accelerates with limit / (I + armature), exactly."""
-    model = scenes.scene(ROTOR.format("hinge", ""), rest=f"<actuator>{servo('j', 1e4, 1, limit=0.6)}</actuator>")
+    model = scenes.scene(ROTOR.format("hinge", ""), rest=ACT.format(servo("j", 1e4, 1, limit=0.6)))
     sim = Simulation(model, 2)
     sim.set_targets([[50.0], [-50.0]])
     for n in range(1, 21):
@@ -127,7 +128,7 @@ def test_effort_limit_of_a_hinge():
 def test_effort_limit_of_a_ball_joint():
     """The limit is the length of the torque, along the error."""
     servos = "".join(servo("j", 1e4, 1, g, 0.6) for g in ("1 0 0", "0 1 0", "0 0 1"))
-    model = scenes.scene(ROTOR.format("ball", ""), rest=f"<actuator>{servos}</actuator>")
+    model = scenes.scene(ROTOR.format("ball", ""), rest=ACT.format(servos))
     sim = Simulation(model, 1)
     axis = np.array([2, -1, 2]) / 3
     sim.set_targets([*np.sin(1.0) * axis, np.cos(1.0)])
@@ -139,7 +140,7 @@ def test_effort_within_the_limit_is_not_clamped():
     """A weak drive with and without a distant limit: same bits."""
     out = []
     for limit in (None, 1e3):
-        model = scenes.scene(ROTOR.format("hinge", ""), rest=f"<actuator>{servo('j', 5, 0.5, limit=limit)}</actuator>")
+        model = scenes.scene(ROTOR.format("hinge", ""), rest=ACT.format(servo("j", 5, 0.5, limit=limit)))
         sim = Simulation(model, 1)
         sim.set_targets([1.0])
         sim.step(50)
@@ -218,6 +219,21 @@ def test_external_force():
     sim.apply_force("b", [0, 0, 0], [1])
     sim.step(10)
     np.testing.assert_allclose(sim.body_qd[1, 0, :3], 0.5 * force / 2.5, rtol=1e-4)
+
+
+def test_force_on_a_body_fixed_to_the_world_changes_nothing():
+    """Same bits as without it, drives at and below their limits included."""
+    fixed = '<body name="post"><geom size="0.1" pos="3 0 0"/></body>'
+    rest = ACT.format(servo("j", 50, 1, limit=0.6))
+    model = scenes.scene(fixed + ROTOR.format("hinge", ""), rest=rest)
+    out = []
+    for force in (0.0, 1e3):
+        sim = Simulation(model, 8, lanes=4)
+        sim.set_targets(np.linspace(-2, 2, 8)[:, None])
+        sim.apply_force("post", [force, -force, force])
+        sim.step(20)
+        out.append(sim.joint_qd.copy())
+    assert np.array_equal(*out)
 
 
 def test_joint_force():

@@ -157,7 +157,7 @@ def test_energy():
 def test_pendulum_converges_with_h():
     """First order: halving the step halves the error, to a tenth."""
     model = scenes.scene(
-        '<body><joint name="j" axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/></body>'
+        '<body><joint axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/></body>'
     )
     k = 0.5 * 9.81 / (0.1 + 0.25)
     exact = solve_ivp(

@@ -76,3 +76,20 @@ def test_pushed_over_it_falls():
     assert list(sim.status & 2) == [0, 2, 0]
     sim.reset([1])
     assert not sim.status.any()
+
+
+def test_holds_the_ball():
+    """A ball in the upturned hand for 5 s: it stays there and does not jitter (RMS under 0.5 m/s^2)."""
+    model = Model.load("player")
+    hold = model.keyframes["hold"]
+    sim = Simulation(model, 1)
+    sim.reset(joint_q=hold)
+    sim.set_targets(hold)
+    sim.step(200)
+    ball = model.body("ball")
+    v = record(sim, 500, lambda sim: sim.body_qd[0, ball, :3].copy())
+    jitter = np.sqrt(np.mean(np.sum((np.diff(v, axis=0) / model.timestep) ** 2, axis=1)))
+    print(f"RMS acceleration of a held ball {jitter:.4f} m/s^2")
+    assert jitter <= 0.5
+    assert not sim.status.any()
+    assert sim.body_q[0, ball, 2] > 1.0
