@@ -101,7 +101,8 @@ def drop_shared(points, link: int, place, shapes: list[Shape], chains: Chains):
 
 
 def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
-    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels; `geoms[k]` is the geom of shape k."""
+    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels; `geoms[k]` is the geom of
+    shape k."""
     chains = Chains(tables)
     place = [
         (

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ["warpdribble", "kernels", "sims", "learning", "assets"]
+FOLDERS = ["warpdribble", "warpdribble/commands", "kernels", "sims", "learning", "assets", "benchmarks"]
 NOT_SOURCE = shutil.ignore_patterns(
     ".git", ".venv*", "venv*", "build", "dist", "out", "*.egg-info", "__pycache__", ".*_cache",
     ".hypothesis", "shared",
@@ -25,7 +25,7 @@ NOT_SOURCE = shutil.ignore_patterns(
 
 IMPORT_ALL = """
 from importlib import import_module, resources
-for name in ["", ".kernels", ".sims", ".learning", ".assets"]:
+for name in ["", ".commands", ".kernels", ".sims", ".learning", ".assets", ".benchmarks"]:
     module = import_module("warpdribble" + name)
     print(module.__name__, module.__file__)
 assert (resources.files("warpdribble.assets") / "player.xml").is_file()
@@ -131,7 +131,8 @@ def test_pyproject_lists_what_exists():
     assert sorted(mapping) == sorted(project["tool"]["setuptools"]["packages"])
     for folder in FOLDERS:
         assert (ROOT / folder / "__init__.py").is_file()
-        sub = [p.parent for p in (ROOT / folder).glob("*/**/__init__.py")]
+        found = [p.parent.relative_to(ROOT) for p in (ROOT / folder).glob("*/**/__init__.py")]
+        sub = [p for p in found if p.as_posix() not in FOLDERS]
         assert not sub, f"{sub}: a sub-package needs a line in pyproject.toml"
 
 

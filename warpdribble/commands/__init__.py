@@ -1,0 +1,14 @@
+"""The commands, one module each: a dataclass is the command line, its `run` does the work.
+
+A new command is a dataclass with a `run() -> int` (the exit status) and a line in `COMMANDS`. Whatever is
+wrong with the input is raised as ValueError or OSError, its message one line that says what to do.
+"""
+
+from .simulate import Demo, Simulate
+
+COMMANDS = {
+    "simulate": Simulate,
+    "demo": Demo,
+}
+
+__all__ = ["COMMANDS"]

@@ -1,0 +1,173 @@
+"""`warpdribble simulate` and `warpdribble demo`: a clip becomes a simulated take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+from .console import bar, check_device, quiet_warp, ready, say
+
+LONGEST = 600.0
+"""[s] of one take."""
+SHORT = 60.0
+"""[s] up to which several starts of the ball are tried: all of them are kept in memory."""
+
+
+@dataclass
+class Simulate:
+    """Let a simulated player follow a recorded clip; write a USD take and a picture."""
+
+    clip: Positional[Path]
+    """Recorded clip, a .bvh file."""
+    frames: tuple[int, int] = (0, -1)
+    """First and last frame of the part to use, counted from 0; -1 is the clip's last."""
+    repeat: int = 1
+    """How many times in a row; the ends are made to meet."""
+    root: Literal["free", "tracked"] = "free"
+    """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too."""
+    out: Path = Path("out/take.usdc")
+    """The take: .usda, .usdc or .usdz. The picture goes beside it, as .png."""
+    model: str = "player"
+    """The player, or the path of an MJCF file with the same body names."""
+    device: str = "cpu"
+    """Where to simulate: cpu, cuda:0, ..."""
+
+    def run(self) -> int:
+        from ..sims import Model
+
+        _check(self)
+        return _simulate(self, Model.load(self.model))
+
+
+@dataclass
+class Demo:
+    """Simulate a dribble that comes with warpdribble; needs no data."""
+
+    repeat: int = 5
+    """How many dribbles."""
+    root: Literal["free", "tracked"] = "free"
+    """free: only the joints are driven. tracked: virtual forces hold the pelvis too."""
+    out: Path = Path("out/demo.usdc")
+    """The take: .usda, .usdc or .usdz. The picture goes beside it, as .png."""
+    device: str = "cpu"
+    """Where to simulate: cpu, cuda:0, ..."""
+
+    def run(self) -> int:
+        from ..sims import Model
+
+        _check(self)
+        return _demo(self, Model.load("player"))
+
+
+def _check(command: Simulate | Demo) -> None:
+    """Raise ValueError or OSError for what cannot work, before anything is computed."""
+    from ..take import check_writable
+
+    if command.repeat < 1:
+        raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
+    check_device(command.device)
+    quiet_warp()
+    check_writable(command.out)
+    check_writable(command.out.with_suffix(".png"), (".png",))
+
+
+def _demo(command: Demo, model) -> int:
+    from ..author import dribble_right
+    from ..sims.reference import Cycle
+    from ..simulate import ball_in_reference
+
+    clip = dribble_right(model)
+    _check_length(clip.reference, command.repeat)
+    reference = Cycle(clip.reference).repeat(model, command.repeat)
+    ball = ball_in_reference(model, reference)
+    say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle")
+    _finish(command, model, reference, ball, "authored dribble")
+    say(
+        "next      open the take in Blender (or any USD viewer), or let the player follow your own "
+        "clip:\n          warpdribble simulate CLIP.bvh --repeat 10"
+    )
+    return 0
+
+
+def _simulate(command: Simulate, model) -> int:
+    from ..sims.reference import close_cycle
+    from ..simulate import ball_from_hand, dribbling_hand, load_clip
+
+    reference, notes = load_clip(model, command.clip, command.frames)
+    _check_length(reference, command.repeat)
+    first, last = command.frames
+    part = f"frames {first} to {'the last' if last < 0 else last}"
+    say(f"clip      {command.clip}, {part}, {reference.duration:.2f} s")
+    for note in notes:
+        say(f"          {note}")
+    if command.repeat > 1:
+        cycle = close_cycle(model, reference)
+        reference = cycle.repeat(model, command.repeat)
+        say(f"          its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
+    ball = None
+    if "ball" in model.body_names:
+        ball = ball_from_hand(model, reference, dribbling_hand(model, reference))
+    _finish(command, model, reference, ball, f"{command.clip.name}, {part}")
+    return 0
+
+
+def _check_length(reference, repeat: int) -> None:
+    """Raise ValueError where a take would not fit into memory."""
+    most = max(1, int(LONGEST / reference.duration))
+    if repeat > most:
+        raise ValueError(f"--repeat {repeat}: at most {most} for this clip ({LONGEST:.0f} s)")
+
+
+def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> None:
+    """Simulate, say how it went, and write the take and its picture."""
+    from .. import __version__
+    from ..sheet import write_sheet
+    from ..simulate import TRIES, simulate
+    from ..take import Take, validate, write_take
+
+    tries = TRIES if ball is not None and reference.duration < SHORT else 1
+    sim = ready(model, tries, command.device)
+    with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
+        run = simulate(sim, reference, command.root, ball, progress)
+    _summary(run, command)
+    take = Take(
+        body_names=list(model.body_names),
+        shapes=model.shapes,
+        body_q=run.body_q,
+        fps=1.0 / model.timestep,
+        notes={"creator": f"warpdribble {__version__}", "clip": source, "root": command.root},
+    )
+    heights = {
+        label: run.body_q[:, model.body(body), 2]
+        for label, body in (("right hand", "r_hand"), ("left hand", "l_hand"))
+        if body in model.body_names
+    }
+    picture = command.out.with_suffix(".png")
+    write_take(command.out, take)
+    write_sheet(picture, take, heights, run.contacts, f"{source}, root {command.root}")
+    errors = validate(command.out)
+    state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
+    say(f"take      {command.out} ({len(take.body_q)} frames at {take.fps:g} fps, {state})")
+    say(f"picture   {picture}")
+
+
+def _summary(run, command) -> None:
+    import numpy as np
+
+    fell = f", first at {run.fallen.argmax() * run.reference.timestep:.2f} s" if run.falls else ""
+    say(
+        f"simulated {run.reference.duration:.2f} s with root {command.root}, "
+        f"{run.real_time_factor:.1f} x real time"
+    )
+    say(
+        f"tracking  joints {np.degrees(run.angle_error.mean()):.1f} degrees, "
+        f"bodies {100.0 * run.position_error.mean():.1f} cm off (means, fingers left out)"
+    )
+    say(f"falls     {run.falls}{fell}")
+    if "ball on ground" in run.contacts:
+        ground = run.contacts["ball on ground"]
+        bounces = int(np.sum(ground[1:] & ~ground[:-1]))
+        say(f"ball      {bounces} bounces (put in play, not yet controlled)")
