@@ -93,7 +93,7 @@ def test_wheel_imports(tmp_path, via_sdist):
 
     names = set(zipfile.ZipFile(wheel).namelist())
     for folder in FOLDERS:
-        prefix = "" if folder == "warpdribble" else "warpdribble/"
+        prefix = "" if folder.startswith("warpdribble") else "warpdribble/"
         pattern = "*" if folder == "assets" else "*.py"
         files = [f.relative_to(ROOT) for f in (ROOT / folder).rglob(pattern) if f.is_file()]
         expected = {prefix + f.as_posix() for f in files if "__pycache__" not in f.parts}
