@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import platform
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import warp as wp
 
-from .. import kernels
+from .batch import Batch
 from .model import Model
 from .tensors import Tensors, as_array
 
-RESPONSE_ROOM = 1365
-"""Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
-
 SWEEPS = 10
-"""Sweeps of the contact solver a step; docs/contact.md shows the residual this leaves."""
-
+"""Sweeps of the contact solver a step; docs/physics.md shows the residual that this leaves."""
 
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
@@ -45,19 +36,7 @@ class Contacts:
     """(world_count, slots, 3) of the last step, along the normal and two tangents [N s]"""
 
 
-def widest_lanes() -> int:
-    """Worlds that one vector register of this processor holds."""
-    machine = platform.machine().lower()
-    if machine in ("aarch64", "arm64"):
-        return 4
-    try:
-        flags = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return 8 if machine in ("x86_64", "amd64") else 4
-    return 16 if "avx512f" in flags else 8 if "avx2" in flags else 4
-
-
-class Simulation:
+class Simulation(Batch):
     """`world_count` worlds of a model.
 
     A CPU steps `lanes` worlds in one pass of its vector unit and shares them among `threads`; on
@@ -77,145 +56,17 @@ class Simulation:
         sweeps: int = SWEEPS,
         max_speed: float = MAX_SPEED,
     ):
-        if world_count < 1:
-            raise ValueError(f"world_count must be at least 1, not {world_count}")
-        self.model = model
-        self.world_count = world_count
-        self.device = wp.get_device(device)
-        on_cpu = self.device.is_cpu
         if not sweeps >= 1:
             raise ValueError(f"sweeps must be at least 1, not {sweeps}")
         if not max_speed > 0:
             raise ValueError(f"max_speed must be positive, not {max_speed}")
-        self.lanes = lanes or (widest_lanes() if on_cpu else 1)
-        if not on_cpu and self.lanes != 1:
-            raise ValueError("lanes are for the CPU; on CUDA leave them out")
-        self._program = kernels.program(self.lanes)
-        self._observer = kernels.program(self.lanes, "observe")
-        self.groups = -(-world_count // self.lanes)
-        self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
-        self._tree = self._make_tree(sweeps, max_speed)
-        self._world = self._make_world()
+        super().__init__(model, world_count, device, threads, lanes)
+        self._tree.sweeps = sweeps
+        self._tree.max_speed = max_speed
         self._targets_set = False
-        self._fill_defaults()
         self.reset()
 
-    # ----------------------------------------------------------------------------------- memory
-
-    def _make_tree(self, sweeps: int, max_speed: float):
-        """The model as the kernels' `Tree`."""
-        program, model = self._program, self.model
-        tree = program.Tree()
-        for name, var in program.Tree.vars.items():
-            if isinstance(var.type, wp.array):
-                rows = model.tables.get(name, np.zeros(0))
-                rows = np.asarray(rows, np.int32 if var.type.dtype is wp.int32 else np.float32)
-                setattr(tree, name, wp.array(rows, dtype=var.type.dtype, device=self.device))
-        tree.h = model.timestep
-        tree.gravity = wp.vec3(*model.tables["gravity"])
-        tree.link_count = len(model.tables["link_parent"]) - 1
-        tree.q_count, tree.dof_count = model.nq, model.nv
-        tree.slot_count = len(model.tables.get("slot_kind", ()))
-        tree.flight_count = len(model.tables.get("flight_link", ()))
-        tree.sweeps = sweeps
-        tree.max_speed = max_speed
-        tree.forced = 0
-        lengths = model.tables.get("slot_length", np.zeros(0, int))
-        tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
-        return tree
-
-    def _make_world(self):
-        """State of all worlds, `(groups, n)` each."""
-        program, model, tree = self._program, self.model, self._tree
-        links = tree.link_count + 1
-        longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + program.HEAD
-        counts = dict.fromkeys(("q", "target"), model.nq)
-        counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
-        counts |= dict.fromkeys(
-            ("mass_scale", "turn", "R", "pos", "r", "V", "I", "p", "pull", "torque", "full", "touched", "knock"), links
-        )
-        counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
-        counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
-        counts |= dict.fromkeys(("broken", "fallen", "fumbled", "hurried"), 1)
-        counts |= {
-            "force": model.nbody,
-            "y": tree.response_room + longest,
-            "active": 2 * tree.slot_count + 2,
-        }
-        world = program.World()
-        for name, var in program.World.vars.items():
-            setattr(world, name, self._allocate(counts[name], var.type.dtype))
-        return world
-
-    def _allocate(self, count: int, dtype) -> wp.array:
-        """Zeros `(groups, count)`; on CUDA stored with the worlds side by side."""
-        count = max(count, 1)
-        if self.device.is_cpu:
-            return wp.zeros((self.groups, count), dtype=dtype, device=self.device)
-        return wp.zeros((count, self.groups), dtype=dtype, device=self.device).transpose()
-
-    def _fill_defaults(self) -> None:
-        pairs = self.model.pairs
-        everyone = np.arange(self.world_count)
-        self._write("mass_scale", everyone, np.ones(self._tree.link_count + 1))
-        for name in ("friction", "restitution"):
-            if pairs:
-                self._write(name, everyone, np.array([pair[name] for pair in pairs]))
-        ground = np.array([0, 0, 0, 1], np.float32)
-        self._write("turn", everyone, ground, column=0)
-        self._write("R", everyone, np.eye(3, dtype=np.float32).ravel(), column=0)
-
-    def _rows(self, array: wp.array) -> np.ndarray:
-        """An array as float32 `(groups, n, parts, lanes)`; on a CPU a view, on CUDA a copy."""
-        rows = array.numpy()
-        rows = rows.view(np.float32) if rows.dtype.fields else rows
-        return rows.reshape(self.groups, array.shape[1], -1, self.lanes)
-
-    def _read(self, array: wp.array, count: int | None = None) -> np.ndarray:
-        """`(world_count, count, parts)` of an array, parts dropped where there is one."""
-        rows = self._rows(array)[:, :count]
-        rows = rows.transpose(0, 3, 1, 2).copy()  # never a view of what the next step changes
-        rows = rows.reshape(-1, *rows.shape[2:])[: self.world_count]
-        return rows[..., 0] if rows.shape[-1] == 1 else rows
-
-    def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
-        """Set a state array of some worlds, or one column of it: `values` `(..., n * parts)`, for each
-        world or for all. The unused worlds of the last group follow the last world."""
-        array = getattr(self._world, name)
-        rows = self._rows(array)
-        columns = slice(None) if column is None else slice(column, column + 1)
-        n, parts = rows[:, columns].shape[1:3]
-        values = np.asarray(values, np.float32)
-        if values.ndim:
-            values = values.reshape(-1, n, parts)
-        values = np.broadcast_to(values, (len(worlds), n, parts))
-        if len(worlds) and worlds[-1] == self.world_count - 1:
-            spare = np.arange(self.world_count, self.groups * self.lanes)
-            worlds = np.concatenate([worlds, spare])
-            values = np.concatenate([values, np.repeat(values[-1:], len(spare), 0)])
-        group, lane = np.divmod(worlds, self.lanes)
-        part = rows[:, columns]
-        part[group, :, :, lane] = values
-        if not self.device.is_cpu:
-            rows[:, columns] = part
-            host = np.ascontiguousarray(rows[..., 0])
-            dtype = array.dtype.numpy_dtype() if hasattr(array.dtype, "numpy_dtype") else np.float32
-            array.assign(host.view(dtype).reshape(array.shape))
-
     # ------------------------------------------------------------------------------------ control
-
-    def _worlds(self, worlds) -> np.ndarray:
-        if worlds is None:
-            return np.arange(self.world_count)
-        worlds = np.atleast_1d(np.asarray(worlds))
-        if worlds.dtype == bool:
-            if worlds.shape != (self.world_count,):
-                raise ValueError(f"a mask of worlds must have shape ({self.world_count},)")
-            return np.flatnonzero(worlds)
-        if worlds.size and not (worlds.min() >= 0 and worlds.max() < self.world_count):
-            raise IndexError(f"worlds must lie in 0 .. {self.world_count - 1}")
-        return worlds.astype(int)
 
     def _values(self, name: str, values, n: int, count: int) -> np.ndarray:
         """Checked `(n,)` or `(count, n)` float32, from NumPy or torch."""
@@ -305,31 +156,6 @@ class Simulation:
         """Advance all worlds by `count` steps of `model.timestep`."""
         self.launch("step", count)
 
-    def launch(self, kernel: str, count: int = 1) -> None:
-        """Run a kernel of `kernels.step`, the whole step or a part of it, `count` times."""
-        self._run(self._program, kernel, [count])
-
-    def _run(self, program, kernel: str, inputs: list) -> None:
-        """Launch over all groups, a slice of them per thread."""
-        function = getattr(program, kernel)
-        size = -(-self.groups // self.threads)
-
-        def run(first: int) -> None:
-            wp.launch(
-                function,
-                dim=min(size, self.groups - first),
-                inputs=[self._tree, self._world, first, *inputs],
-                device=self.device,
-            )
-
-        starts = range(0, self.groups, size)
-        if self._pool is None:
-            for first in starts:
-                run(first)
-        else:
-            program.load(self.device)
-            list(self._pool.map(run, starts))
-
     # ------------------------------------------------------------------------------- observations
 
     @property
@@ -382,7 +208,7 @@ class Simulation:
         self._run(self._observer, "gaps", [])
         model, world = self.model, self._world
         count = self._tree.slot_count
-        impulse = self._read(world.impulse, count).reshape(self.world_count, -1, 3)[:, :count].copy()
+        impulse = self._read(world.impulse)[:, :count]
         knock = self._read(world.knock)
         for link, slot in zip(
             model.tables.get("flight_link", ()), model.tables.get("flight_slot", ()), strict=True
@@ -392,9 +218,9 @@ class Simulation:
         shapes = [model.pairs[pair]["shapes"] for pair in pairs]
         return Contacts(
             shapes=[(model.shapes[a].name, model.shapes[b].name) for a, b in shapes],
-            gap=self._read(world.gap, count)[:, :count],
-            point=self._read(world.point, count).reshape(self.world_count, -1, 3)[:, :count],
-            normal=self._read(world.normal, count).reshape(self.world_count, -1, 3)[:, :count],
+            gap=self._read(world.gap)[:, :count],
+            point=self._read(world.point)[:, :count],
+            normal=self._read(world.normal)[:, :count],
             impulse=impulse,
         )
 
@@ -478,9 +304,3 @@ class Simulation:
         if not np.isfinite(mass).all() or (mass <= 0).any():
             raise ValueError("mass must be positive")
         self._write("mass_scale", worlds, (mass / self.model.body_mass[b]).reshape(-1, 1), column=link)
-
-    @property
-    def memory_per_world(self) -> float:
-        """Bytes of state a world takes."""
-        arrays = (getattr(self._world, name) for name in self._program.World.vars)
-        return sum(a.capacity for a in arrays) / (self.groups * self.lanes)
