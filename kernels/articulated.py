@@ -18,7 +18,7 @@ are solved in these coordinates (see `contact`). `world.U` holds U D^(-1/2) and 
 import warp as wp
 
 from .drive import Push, judge, pd, spring, stop
-from .kinematics import drift, load3, load4, store3
+from .kinematics import load3, load4, store3
 from .spatial import *
 from .tree import BALL, FREE, GROUND, HINGE, Tree, World
 
@@ -170,9 +170,8 @@ def factorize(tree: Tree, world: World, g: int):
     for k in range(tree.link_count):
         i = tree.link_count - k
         joint = tree.link_joint[i]
-        I = world.I[g, i]
         parent = tree.link_parent[i]
-        b = Body(I, world.p[g, i] + I * drift(world, g, i, parent), world.V[g, i])
+        b = Body(world.I[g, i], world.p[g, i], world.V[g, i])
         if joint == HINGE:
             b = hinge_joint(tree, world, g, i, b)
         elif joint == BALL:

@@ -61,31 +61,30 @@ def kinematics(tree: Tree, world: World, g: int):
 
 
 @wp.func
-def drift(world: World, g: int, i: int, parent: int) -> Motion:
-    """Acceleration of a link whose joint and parent do not accelerate: what its joint's velocity gains
-    from the parent's turning, and the parent's centripetal acceleration."""
-    w = world.V[g, parent].w
-    return Motion(cross(w, world.V[g, i].w), cross(w, cross(w, world.r[g, i])))
-
-
-@wp.func
 def inertias(tree: Tree, world: World, g: int):
-    """Each link's own inertia I and the force p that holds it on its present course:
-    p = V x* I V - gravity [2.72], about the link's origin."""
+    """Each link's own inertia I; its acceleration A were no joint to accelerate; and the force p that
+    A and its velocity ask for [2.72, 5.3], less gravity, about the link's origin."""
     gravity = vec3(tree.gravity)
     for i in range(1, tree.link_count + 1):
+        parent = tree.link_parent[i]
         R = world.R[g, i]
+        r = world.r[g, i]
+        w = world.V[g, i].w
+        w0 = world.V[g, parent].w
+        above = world.A[g, parent]
+        A = Motion(
+            above.w + cross(w0, w), above.v + cross(above.w, r) + cross(w0, cross(w0, r))
+        )
         k = world.mass_scale[g, i]
         J = tree.link_moments[i]
         P = tree.link_products[i]
         mass = k * tree.link_mass[i]
         com = rotate(R, tree.link_com[i])
-        I = rigid(
-            R, mass, com, Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2])
-        )
-        w = world.V[g, i].w
-        f = mass * (cross(w, cross(w, com)) - gravity)
-        n = cross(w, I.A * w) - mass * cross(com, gravity)
+        I = rigid(R, mass, com, Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2]))
+        fall = A.v - gravity
+        f = mass * (fall + cross(A.w, com) + cross(w, cross(w, com)))
+        n = I.A * A.w + cross(w, I.A * w) + mass * cross(com, fall)
+        world.A[g, i] = A
         world.I[g, i] = I
         world.p[g, i] = Force(n, f)
     if tree.forced != 0:

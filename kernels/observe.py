@@ -7,7 +7,7 @@ whatever a step has left behind.
 import warp as wp
 
 from .collide import probe
-from .kinematics import drift, inertias, kinematics
+from .kinematics import inertias, kinematics
 from .spatial import *
 from .tree import BALL, GROUND, HINGE, Tree, World
 
@@ -121,22 +121,12 @@ def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real))
 
 
 @wp.kernel
-def bias_force(
-    tree: Tree, world: World, first: int, A: wp.array2d(dtype=Motion), C: wp.array2d(dtype=Real)
-):
+def bias_force(tree: Tree, world: World, first: int, C: wp.array2d(dtype=Real)):
     """Generalised force that holds the present velocity: Coriolis, centrifugal and gravity, by recursive
-    Newton-Euler with no joint acceleration (RBDA table 5.1). External forces
-    count in. A: scratch, zero, an entry per link."""
+    Newton-Euler with no joint acceleration (RBDA table 5.1). External forces count in."""
     g = first + wp.tid()
     kinematics(tree, world, g)
     inertias(tree, world, g)
-    for i in range(1, tree.link_count + 1):
-        parent = tree.link_parent[i]
-        above = A[g, parent]  # the ground's stays zero
-        own = drift(world, g, i, parent)
-        a = Motion(above.w + own.w, above.v + cross(above.w, world.r[g, i]) + own.v)
-        A[g, i] = a
-        world.p[g, i] = world.p[g, i] + world.I[g, i] * a
     for c in range(tree.link_count):
         i = tree.link_count - c
         p = world.p[g, i]

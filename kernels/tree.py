@@ -147,6 +147,8 @@ class World:
     pos: wp.array2d(dtype=Vec3)
     r: wp.array2d(dtype=Vec3)
     V: wp.array2d(dtype=Motion)
+    A: wp.array2d(dtype=Motion)
+    """acceleration of a link whose joints, and those above it, do not accelerate"""
     I: wp.array2d(dtype=Inertia)
     p: wp.array2d(dtype=Force)
 

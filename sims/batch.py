@@ -96,7 +96,7 @@ class Batch:
         longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + program.HEAD
         counts = dict.fromkeys(("q", "target"), model.nq)
         counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
-        counts |= dict.fromkeys(("mass_scale", "turn", "R", "pos", "r", "V", "I", "p"), links)
+        counts |= dict.fromkeys(("mass_scale", "turn", "R", "pos", "r", "V", "A", "I", "p"), links)
         counts |= dict.fromkeys(("pull", "torque", "full", "touched", "knock"), links)
         counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
         counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))

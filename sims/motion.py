@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+RECORDED = ("positions", "ball", "ball_held")
+"""What only some formats record, a row per frame; None in a motion without it."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -34,6 +37,13 @@ class Motion:
     rest_rotations: np.ndarray
     """(joints, 4) [-], xyzw, the T-pose that calibrates retargeting (identity where none was
     recorded)."""
+    positions: np.ndarray | None = None
+    """(frames, joints, 3) [m], joint origins as recorded, where the format has them: they may differ from
+    forward kinematics by the recording's own error."""
+    ball: np.ndarray | None = None
+    """(frames, 3) [m], centre of the recorded ball."""
+    ball_held: np.ndarray | None = None
+    """(frames,) bool, a hand holds or touches the ball."""
 
     def __post_init__(self):
         joints, frames = len(self.joint_names), len(self.root_position)
@@ -43,7 +53,12 @@ class Motion:
             ("rotations", (frames, joints, 4)),
             ("root_position", (frames, 3)),
             ("rest_rotations", (joints, 4)),
+            ("positions", (frames, joints, 3)),
+            ("ball", (frames, 3)),
+            ("ball_held", (frames,)),
         ):
+            if field in RECORDED and getattr(self, field) is None:
+                continue
             if np.shape(getattr(self, field)) != shape:
                 raise ValueError(f"{field} is {np.shape(getattr(self, field))}, should be {shape}")
         if frames < 1:
@@ -76,13 +91,19 @@ class Motion:
                 f"frames {first} to {last} are not a range within 0 to {self.frame_count - 1}"
             )
         part = slice(first, last + 1)
-        return replace(self, rotations=self.rotations[part], root_position=self.root_position[part])
+        return replace(
+            self,
+            rotations=self.rotations[part],
+            root_position=self.root_position[part],
+            **self._recorded(lambda values: values[part]),
+        )
 
     def resample(self, rate: float) -> Motion:
         """The same motion at another rate [Hz].
 
-        Rotations move along geodesics between the recorded frames, the root along straight lines.
-        The last frame is kept to within half a new frame.
+        Rotations move along geodesics between the recorded frames, the root, recorded positions and the
+        ball along straight lines; `ball_held` takes the nearest frame's. The last frame is kept to
+        within half a new frame.
         """
         if rate <= 0:
             raise ValueError(f"a rate must be positive, not {rate}")
@@ -93,7 +114,14 @@ class Motion:
             rotations=interpolate_rotations(self.rotations, at),
             root_position=interpolate_lines(self.root_position, at),
             rate=(count - 1) / self.duration if count > 1 else rate,
+            **self._recorded(lambda values: interpolate_lines(values, at)),
         )
+
+    def _recorded(self, change) -> dict[str, np.ndarray]:
+        """The recorded fields that there are, each with `change` applied; true or false stays so."""
+        has = {name: getattr(self, name) for name in RECORDED if getattr(self, name) is not None}
+        new = {name: change(values.astype(float)) for name, values in has.items()}
+        return {n: v > 0.5 if has[n].dtype == bool else v for n, v in new.items()}
 
     def forward(self) -> tuple[np.ndarray, np.ndarray]:
         """Forward kinematics: joint origins (frames, joints, 3) [m] and joint frames (frames,

@@ -246,9 +246,8 @@ class Simulation(Batch):
     def bias_force(self) -> np.ndarray:
         """(world_count, nv) Coriolis, centrifugal and gravity force, as they stand on the left of
         M qdd + bias = f [N, N m]; applied external forces count in"""
-        A = self._allocate(self._tree.link_count + 1, self._program.Motion)
         C = self._allocate(self.model.nv, self._program.Real)
-        self._run(self._observer, "bias_force", [A, C])
+        self._run(self._observer, "bias_force", [C])
         return self._read(C)
 
     # ------------------------------------------------------------------------- parameters by world

@@ -13,6 +13,7 @@ import numpy as np
 import pybvh
 from scipy.spatial.transform import Rotation
 
+from .clip_error import ClipError
 from .sims.motion import Motion
 
 CMU_UNIT = 2.54 / 100 / 0.45
@@ -26,14 +27,6 @@ CMU_THORAX = ("Neck", "LeftShoulder", "RightShoulder")
 
 Z_UP_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Takes a rest pose facing +Z, left +X, up +Y to one facing +X, left +Y, up +Z."""
-
-
-class ClipError(ValueError):
-    """A clip that cannot be used; the message is one line with the file and the reason."""
-
-    def __init__(self, path: str | Path, reason: str):
-        super().__init__(f"{path}: {reason}")
-        self.path, self.reason = Path(path), reason
 
 
 def read_bvh(path: str | Path) -> tuple[Motion, list[str]]:

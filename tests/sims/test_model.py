@@ -223,3 +223,48 @@ def test_contact_filter_is_mujocos():
         frozenset(m.geom(int(g)).name or f"geom{int(g)}" for g in (c.geom1, c.geom2)) for c in data.contact
     }
     assert found == expected
+
+
+def test_contact_filter_knows_parents_and_exclusions():
+    """As MuJoCo: not a body with its parent, unless that is fixed to the world; not what is excluded."""
+
+    def ball(name, inner="", attributes=""):
+        return (
+            f'<body name="{name}"><joint/><geom name="{name}" size="0.1" pos="0.3 0 0" {attributes}/>'
+            f"{inner}</body>"
+        )
+
+    xml = mjcf(
+        '<geom name="floor" type="plane" size="1 1 1"/>'
+        + f'<body name="post"><geom name="post" size="0.1"/>{ball("arm")}</body>'
+        + ball("a", ball("b", ball("c")))
+        + ball("ghost", attributes='contype="0" conaffinity="0"')
+        + ball("far", attributes='contype="2" conaffinity="4"'),
+        rest='<contact><exclude body1="a" body2="c"/></contact>',
+    )
+    model = scenes.model(xml)
+    found = {frozenset(model.shapes[k].name for k in p["shapes"]) for p in model.pairs}
+    names = "floor-arm floor-a floor-b floor-c post-arm post-a post-b post-c arm-a arm-b arm-c"
+    assert found == {frozenset(pair.split("-")) for pair in names.split()}
+
+
+def test_contact_properties_of_a_pair():
+    """Friction: the larger, or that of the higher priority; none where condim is 1. Restitution: the
+    product; erp and cfm: the mean."""
+
+    def shape(name, attributes):
+        return f'<body><freejoint/><geom name="{name}" size="0.1" {attributes}/></body>'
+
+    model = scenes.scene(
+        '<geom name="floor" type="plane" size="1 1 1" friction="0.5" user="0.5 0.2 1e-5"/>'
+        + shape("rough", 'friction="0.9" user="0.8 0.4 3e-5" contype="0"')
+        + shape("smooth", 'friction="0.1" user="0 0.2 1e-5" contype="0"')
+        + shape("chief", 'friction="0.1" priority="1" contype="0"')
+        + shape("slick", 'friction="0.9" condim="1" priority="1" contype="0"')
+    )
+    pairs = {model.shapes[p["shapes"][1]].name: p for p in model.pairs}
+    friction = {name: pair["friction"] for name, pair in pairs.items()}
+    assert friction == {"rough": 0.9, "smooth": 0.5, "chief": 0.1, "slick": 0.0}
+    assert pairs["rough"]["restitution"] == pytest.approx(0.4)
+    assert (pairs["rough"]["erp"], pairs["rough"]["cfm"]) == pytest.approx((0.3, 2e-5))
+    assert pairs["smooth"]["restitution"] == 0.0
