@@ -3,7 +3,7 @@
 import warp as wp
 
 from .spatial import *
-from .tree import BALL, FREE, Tree, World
+from .tree import BALL, FREE, GROUND, Tree, World
 
 
 @wp.func
@@ -90,6 +90,8 @@ def inertias(tree: Tree, world: World, g: int):
     if tree.forced != 0:
         for b in range(tree.body_link.shape[0]):
             i = tree.body_link[b]
-            f = world.force[g, b]
-            p = world.p[g, i]
-            world.p[g, i] = Force(p.n - cross(rotate(world.R[g, i], tree.body_com[b]), f), p.f - f)
+            if i != GROUND:
+                f = world.force[g, b]
+                p = world.p[g, i]
+                at = rotate(world.R[g, i], tree.body_com[b])
+                world.p[g, i] = Force(p.n - cross(at, f), p.f - f)

@@ -176,6 +176,8 @@ class Batch:
             if worlds.shape != (self.world_count,):
                 raise ValueError(f"a mask of worlds must have shape ({self.world_count},)")
             return np.flatnonzero(worlds)
+        if worlds.size and not np.issubdtype(worlds.dtype, np.integer):
+            raise ValueError("worlds must be whole numbers or a mask")
         if worlds.size and not (worlds.min() >= 0 and worlds.max() < self.world_count):
             raise IndexError(f"worlds must lie in 0 .. {self.world_count - 1}")
         return worlds.astype(int)

@@ -131,6 +131,23 @@ def check_supported(m, path: str | Path) -> None:
         refuse(f"frictionloss of joint '{m.joint(m.dof_jntid[dof]).name}'", "use damping")
     if m.opt.density or m.opt.viscosity:
         refuse("a fluid medium (option density, viscosity)", "remove it")
+    if np.any(m.body_gravcomp):
+        body = int(np.argmax(m.body_gravcomp != 0))
+        refuse(f"gravcomp of body '{m.body(body).name}'", "remove it")
+    import mujoco
+
+    for flag in mujoco.mjtDisableBit.__members__.values():
+        if m.opt.disableflags & int(flag) and flag in _needed_flags():
+            name = flag.name.removeprefix("mjDSBL_").lower()
+            refuse(f"option flag {name}='disable'", f"leave {name} enabled")
+
+
+def _needed_flags() -> set:
+    """Parts of a step that a file may not switch off."""
+    import mujoco
+
+    names = ("CONSTRAINT", "LIMIT", "CONTACT", "SPRING", "DAMPER", "GRAVITY", "ACTUATION")
+    return {getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}") for name in names}
 
 
 def _geom_type(kind: int) -> str:
@@ -236,6 +253,13 @@ def read_inertia(m, body_link, body_offset, body_turn, link_count: int) -> dict[
     }
 
 
+def _both_ways(low: float, high: float, what: str) -> float:
+    """The effort limit of a range. Raises ModelError where it is not the same both ways."""
+    if not np.isclose(-low, high):
+        raise ModelError(f"{what}: a force range must be the same both ways, not {low:g} to {high:g}")
+    return float(high)
+
+
 def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """kp, kd per dof [N m/rad, N m s/rad] from position actuators; efforts go into `t`; and notes on
     actuators that are left to the user."""
@@ -244,7 +268,8 @@ def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray,
     notes = []
     for j in range(m.njnt):
         if m.jnt_actfrclimited[j]:
-            effort[m.jnt_dofadr[j]] = min(np.abs(m.jnt_actfrcrange[j]))
+            limit = _both_ways(*m.jnt_actfrcrange[j], f"{path}: joint '{m.joint(j).name}'")
+            effort[m.jnt_dofadr[j]] = limit
     for a in range(m.nu):
         name = m.actuator(a).name or str(a)
         if int(m.actuator_trntype[a]) not in (0, 1) or int(m.actuator_dyntype[a]) != 0:
@@ -262,9 +287,14 @@ def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray,
         if m.jnt_type[j] == 0 or not np.allclose(gear, unit):
             raise ModelError(f"{path}: actuator '{name}': gear must be one unit axis of a joint")
         dof = int(m.jnt_dofadr[j]) + axis
+        if kp[dof] > 0:
+            raise ModelError(f"{path}: actuator '{name}' is a second drive of the same joint")
+        if m.actuator_ctrllimited[a]:
+            raise ModelError(f"{path}: actuator '{name}': ctrlrange is not supported; limit the joint")
         kp[dof], kd[dof] = gain[0], -bias[2]
         if m.actuator_forcelimited[a]:
-            effort[dof] = min(effort[dof], *np.abs(m.actuator_forcerange[a]))
+            low, high = m.actuator_forcerange[a]
+            effort[dof] = min(effort[dof], _both_ways(low, high, f"{path}: actuator '{name}'"))
     for i in range(1, len(t.link_joint)):
         dof = t.link_dof[i]
         if t.link_joint[i] == BALL:

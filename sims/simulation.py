@@ -104,7 +104,7 @@ class Simulation(Batch):
         self._write("qd", worlds, qd)
         if not self._targets_set:
             self._write("target", worlds, q)
-        for name in ("broken", "fallen", "fumbled", "hurried", "impulse", "full", "torque"):
+        for name in ("broken", "fallen", "fumbled", "hurried", "impulse", "knock", "full", "torque"):
             self._write(name, worlds, 0.0)
 
     def set_targets(self, joint_target_q) -> None:
@@ -123,6 +123,8 @@ class Simulation(Batch):
         """A force (3,) or (len(worlds), 3) [N, world axes] at a body's centre of mass, until changed."""
         worlds = self._worlds(worlds)
         body = self.model.body(body) if isinstance(body, str) else int(body)
+        if not 0 <= body < self.model.nbody:
+            raise IndexError(f"body must lie in 0 .. {self.model.nbody - 1}, not {body}")
         force = self._values("force", force, 3, len(worlds))
         self._write("force", worlds, np.atleast_2d(force), column=body)
         self._tree.forced = 1
