@@ -13,6 +13,7 @@ PARTS = {
     "kinematics": "run_kinematics",
     "inertia": "run_inertias",
     "factor": "run_factorize",
+    "effort limits": "run_judge_drives",
     "contact rows": "run_find",
     "contact solve": "run_solve",
     "velocities": "run_velocities",

@@ -38,10 +38,6 @@ def _native(expression: str, arguments: str = "ab") -> str:
     )
 
 
-def _splat(name: str) -> str:
-    return name if LANES == 1 else f"(V{{}} + {name})"
-
-
 @wp.func_native(_native("a_ + b_"))
 def add(a: Real, b: Real) -> Real: ...
 

@@ -8,6 +8,7 @@ is refused by name rather than left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -79,18 +80,72 @@ def wxyz(q: np.ndarray) -> np.ndarray:
     return np.roll(np.asarray(q, float), 1, axis=-1)
 
 
-def compile_mjcf(path: str | Path):
-    """MuJoCo's model of an MJCF file. Raises ModelError."""
+def compile_mjcf(path: str | Path, rigid: tuple[str, ...] = (), pose: str = "start"):
+    """MuJoCo's model of an MJCF file, and its keyframes: name -> {joint name: qpos} in joint order.
+
+    Joints whose names match a pattern of `rigid` are frozen as they are in the keyframe `pose`, or in the
+    zero pose where there is no such keyframe. Raises ModelError.
+    """
     import mujoco
 
     path = Path(path)
     if not path.is_file():
         raise ModelError(f"{path}: no such file; give the path of an MJCF file, or 'player'")
     try:
-        return mujoco.MjSpec.from_file(str(path)).compile()
+        spec = mujoco.MjSpec.from_file(str(path))
+        model = spec.compile()
+        keys = {model.key(k).name: _by_joint(model, model.key_qpos[k]) for k in range(model.nkey)}
+        if rigid:
+            frozen = _freeze(spec, model, rigid, keys.get(pose, _by_joint(model, model.qpos0)), path)
+            model = spec.compile()
+            keys = {
+                key: {name: q for name, q in joints.items() if name not in frozen}
+                for key, joints in keys.items()
+            }
     except (ValueError, RuntimeError) as error:
+        if isinstance(error, ModelError):
+            raise
         reason = " ".join(str(error).split())
         raise ModelError(f"{path}: not a valid MJCF file: {reason}") from None
+    return model, keys
+
+
+def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
+    sizes = {0: 7, 1: 4, 2: 1, 3: 1}
+    return {
+        m.joint(j).name or f"joint{j}": qpos[m.jnt_qposadr[j] :][: sizes[int(m.jnt_type[j])]].copy()
+        for j in range(m.njnt)
+    }
+
+
+def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> set[str]:
+    """Take the joints that match a pattern out of a spec, their bodies turned as in `pose`; their names."""
+    frozen = {name for name in pose if any(fnmatch(name, pattern) for pattern in rigid)}
+    if not frozen:
+        raise ModelError(f"{path}: no joint is named like {', '.join(rigid)}")
+    for actuator in list(spec.actuators):
+        if actuator.target in frozen:
+            spec.delete(actuator)
+    for key in list(spec.keys):
+        spec.delete(key)
+    for joint in list(spec.joints):
+        if joint.name not in frozen:
+            continue
+        j = m.joint(joint.name).id
+        b = int(m.jnt_bodyid[j])
+        if m.jnt_type[j] not in (1, 3) or m.body_jntnum[b] != 1:
+            raise ModelError(f"{path}: joint '{joint.name}' cannot be made rigid: not its body's only one")
+        q = pose[joint.name]
+        turn = Rotation.from_quat(xyzw(q)) if len(q) == 4 else None
+        if turn is None:
+            turn = Rotation.from_rotvec((q[0] - m.qpos0[m.jnt_qposadr[j]]) * m.jnt_axis[j])
+        frame = Rotation.from_quat(xyzw(m.body_quat[b]))
+        anchor = m.jnt_pos[j]
+        body = spec.body(m.body(b).name)
+        body.pos = m.body_pos[b] + frame.apply(anchor - turn.apply(anchor))
+        body.quat = wxyz((frame * turn).as_quat())
+        spec.delete(joint)
+    return frozen
 
 
 def check_supported(m, path: str | Path) -> None:

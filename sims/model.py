@@ -70,8 +70,11 @@ class Model:
     notes: list[str] = field(default_factory=list)
 
     @staticmethod
-    def load(name: str | Path = "player") -> Model:
+    def load(name: str | Path = "player", rigid: tuple[str, ...] = (), pose: str = "start") -> Model:
         """Model of an MJCF file, or the shipped one by name ("player").
+
+        Joints whose names match a pattern of `rigid` are frozen as in the keyframe `pose`: with
+        `rigid=("*_mcp", "*_pip", "*_dip")` the player has stiff hands and 51 degrees of freedom.
 
         Raises ModelError (a ValueError) when the file is missing, broken or holds something that is
         not simulated.
@@ -79,8 +82,17 @@ class Model:
         if str(name) == "player":
             from ..assets import path as asset
 
-            return load_mjcf(asset("player.xml"), "player")
-        return load_mjcf(Path(name), Path(name).stem)
+            return load_mjcf(asset("player.xml"), "player", rigid, pose)
+        return load_mjcf(Path(name), Path(name).stem, rigid, pose)
+
+    def convert_q(self, other: Model, joint_q: np.ndarray) -> np.ndarray:
+        """joint_q (..., nq) of another model with joints of the same names, for this one; joints that
+        the other lacks take the start pose."""
+        joint_q = np.asarray(joint_q)
+        q = np.broadcast_to(self.start_q, (*joint_q.shape[:-1], self.nq)).copy()
+        for name in set(self.joint_names) & set(other.joint_names):
+            q[..., self.q_slice(name)] = joint_q[..., other.q_slice(name)]
+        return q
 
     # ------------------------------------------------------------------------------------- names
 
@@ -138,8 +150,8 @@ def _index(names: list[str], name: str, what: str) -> int:
         raise KeyError(f"no {what} named {name!r}; there are: {known}") from None
 
 
-def load_mjcf(path: Path, name: str) -> Model:
-    m = compile_mjcf(path)
+def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str) -> Model:
+    m, keys = compile_mjcf(path, rigid, pose)
     check_supported(m, path)
     t, bodies = read_links(m)
     inertia = read_inertia(m, **bodies, link_count=len(t.link_parent))
@@ -201,7 +213,9 @@ def load_mjcf(path: Path, name: str) -> Model:
         pairs=pairs,
         notes=notes,
     )
-    model.keyframes = {m.key(k).name: _order(model, m.key_qpos[k]) for k in range(m.nkey)}
+    model.keyframes = {
+        key: _order(model, np.concatenate(list(joints.values()))) for key, joints in keys.items()
+    }
     model.start_q = model.keyframes.get("start", _order(model, m.qpos0)).copy()
     tables["q_spring"] = _order(model, m.qpos_spring)
     tables["gravity"] = m.opt.gravity.copy()

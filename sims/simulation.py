@@ -16,6 +16,9 @@ SWEEPS = 10
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
 
+CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
+"""State that a step hands to the next."""
+
 NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
 """Bits of `Simulation.status`."""
 
@@ -100,12 +103,21 @@ class Simulation(Batch):
         q = self._unit(self._values("joint_q", joint_q, model.nq, len(worlds)), "joint_q")
         qd = np.zeros(model.nv) if joint_qd is None else joint_qd
         qd = self._values("joint_qd", qd, model.nv, len(worlds))
-        self._write("q", worlds, q)
-        self._write("qd", worlds, qd)
+        for name in CARRIED:
+            self._write(name, worlds, {"q": q, "qd": qd}.get(name, 0.0))
         if not self._targets_set:
             self._write("target", worlds, q)
-        for name in ("broken", "fallen", "fumbled", "hurried", "impulse", "knock", "full", "torque"):
-            self._write(name, worlds, 0.0)
+
+    def copy_worlds(self, sources) -> None:
+        """Give every world the state of another: world k becomes what world `sources[k]` (world_count,)
+        is now, its contact history and status included. Targets, forces and parameters stay."""
+        sources = self._worlds(sources)
+        if sources.shape != (self.world_count,):
+            raise ValueError(f"sources must have shape ({self.world_count},), not {sources.shape}")
+        everyone = np.arange(self.world_count)
+        for name in CARRIED:
+            array = getattr(self._world, name)
+            self._write(name, everyone, self._read(array)[sources].reshape(self.world_count, -1))
 
     def set_targets(self, joint_target_q) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
