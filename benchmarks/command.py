@@ -14,6 +14,7 @@ import numpy as np
 import tyro
 
 from ..sims.simulation import SWEEPS
+from .mjwarp import MuJoCoWarp
 from .mujoco import SETTINGS, MuJoCo
 from .ours import Ours, solver_error
 from .scene import hold
@@ -29,8 +30,9 @@ class Step:
 
     worlds: tuple[int, ...] = (256,)
     """How many worlds; several numbers make a table."""
-    against: Literal["mujoco", "none"] = "mujoco"
-    """The peer, on the same MJCF file in the same run."""
+    against: Literal["mujoco", "mujoco_warp", "none"] = "mujoco"
+    """The peer, on the same MJCF file in the same run: MuJoCo's C engine on one core, or MuJoCo Warp on
+    the same device with as many worlds (needs mujoco_warp)."""
     format: Literal["table", "json"] = "table"
     device: str = "cpu"
     threads: int = 1
@@ -94,6 +96,8 @@ def step(options: Step) -> Result:
     peers = {}
     if options.against == "mujoco":
         peers = {name: MuJoCo(scene, name) for name in SETTINGS}
+    elif options.against == "mujoco_warp":
+        peers = {f"Warp, {n} worlds": MuJoCoWarp(scene, n, options.device) for n in options.worlds}
     times: dict[object, list[float]] = {side: [] for side in (*sides, *peers.values())}
     for round_ in range(options.rounds):
         for side, seconds in times.items():
@@ -116,7 +120,7 @@ def step(options: Step) -> Result:
     for name, peer in peers.items():
         speed = 1 / float(np.median(times[peer]))
         contacts = float(np.mean(peer.contacts))
-        error = peer.solver_error()
+        error = peer.solver_error() if isinstance(peer, MuJoCo) else None
         result.peers[name] = dict(
             steps_per_second=round(speed),
             contacts=contacts,
@@ -170,9 +174,11 @@ def print_step(result: Result) -> None:
     for name, us in result.parts_us.items():
         print(f"{name:>16} {us:8.3f} us {100 * us / total:5.1f} %")
     for name, peer in result.peers.items():
+        error = peer["velocity_error"]
+        error = "" if error is None else f"velocity error {error:.1e} rad/s, "
         print(
             f"MuJoCo {name}: {peer['steps_per_second']:,} steps/s, {peer['contacts']:.1f} contacts, "
-            f"velocity error {peer['velocity_error']:.1e} rad/s; ours is {peer['ratio']} x"
+            f"{error}ours is {peer['ratio']} x"
         )
 
 
