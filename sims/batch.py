@@ -64,7 +64,8 @@ class Batch:
         self._observer = kernels.program(self.lanes, "observe")
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
+        self._loaded: set = set()
         self._tree = self._make_tree()
         self._world = self._make_world()
         self._fill_defaults()
@@ -199,13 +200,13 @@ class Batch:
                 device=self.device,
             )
 
-        starts = range(0, self.groups, size)
-        if self._pool is None:
-            for first in starts:
-                run(first)
-        else:
-            program.load(self.device)
-            list(self._pool.map(run, starts))
+        if program not in self._loaded:
+            program.load(self.device)  # before threads launch it
+            self._loaded.add(program)
+        others = [self._pool.submit(run, first) for first in range(size, self.groups, size)]
+        run(0)  # this thread works too
+        for other in others:
+            other.result()
 
     @property
     def memory_per_world(self) -> float:
