@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from .motion import interpolate_lines, interpolate_rotations
 
+ALONG = 0.05
+"""[m] What is loose goes along with a cycle that it ends this near to where the next begins."""
 BLEND = 0.4
 """[s] at the end of a clip in which it is bent back to its beginning."""
 
@@ -60,21 +62,35 @@ class Cycle:
             raise ValueError(f"a cycle is repeated at least once, not {count} times")
         body = self.reference.joint_q[:-1]
         pieces, start = [], self.reference.joint_q[:1]
-        root = model.q_slice(root_joint(model))
+        free = [model.q_slice(root_joint(model)), *self._carried(model)]
         for number in range(count):
-            pieces.append(self._moved(body, root, number))
-        pieces.append(self._moved(start, root, count))
+            pieces.append(self._moved(body, free, number))
+        pieces.append(self._moved(start, free, count))
         return replace(self.reference, joint_q=np.concatenate(pieces))
 
-    def _moved(self, joint_q, root: slice, number: int) -> np.ndarray:
+    def _carried(self, model) -> list[slice]:
+        """Where what is loose and goes along, as a dribbled ball, is in joint_q."""
+        loose = [model.q_slice(n) for n in model.joint_names[1:] if model.joint_type(n) == "free"]
+        root, last = model.q_slice(root_joint(model)), self.reference.joint_q[-1]
         anchor = self.reference.joint_q[0, root][:2]
+        along = []
+        for part in loose:
+            first = self.reference.joint_q[:1, part]
+            goal = _over_ground(first, anchor, anchor + np.asarray(self.travel), self.turn)[0]
+            if np.linalg.norm(goal[:3] - last[part][:3]) < ALONG:
+                along.append(part)
+        return along
+
+    def _moved(self, joint_q, free: list[slice], number: int) -> np.ndarray:
+        """Rows joint_q (n, nq) in the cycle of that number: the root and all that is loose, as the ball, are
+        further on."""
+        anchor = self.reference.joint_q[0, free[0]][:2]
         place = np.zeros(2)
         for i in range(number):
             place = place + _plane(i * self.turn) @ np.asarray(self.travel)
         joint_q = joint_q.copy()
-        joint_q[:, root] = _over_ground(
-            joint_q[:, root], anchor, anchor + place, number * self.turn
-        )
+        for part in free:
+            joint_q[:, part] = _over_ground(joint_q[:, part], anchor, anchor + place, number * self.turn)
         return joint_q
 
 
@@ -97,13 +113,25 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     anchor = first[root][:2]
     goal[root] = _over_ground(first[root][None], anchor, anchor + travel, turn)[0]
     missing = difference(model, last[None], goal[None])
+    faster = _speed(model, reference, slice(0, 4)) - _speed(model, reference, slice(-4, None))
+    if reference.frame_count < 8:
+        faster[:] = 0.0
+    lines = model.dof_slice(root_joint(model)).start
+    ahead = _plane(turn) @ _speed(model, reference, slice(0, 4))[lines : lines + 2]
+    faster[lines : lines + 2] += ahead - _speed(model, reference, slice(0, 4))[lines : lines + 2]
     span = min(BLEND, 0.5 * reference.duration)
     before = reference.duration - reference.timestep * np.arange(reference.frame_count)
     share = np.clip(1.0 - before / span, 0.0, 1.0)[:, None]
-    share = share**2 * (3.0 - 2.0 * share)
-    closed = integrate(model, reference.joint_q, share * missing)
+    bend = share**2 * (3.0 - 2.0 * share) * missing + share**2 * (share - 1.0) * span * faster
+    closed = integrate(model, reference.joint_q, bend)
     size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
     return Cycle(replace(reference, joint_q=closed), turn, tuple(travel.tolist()), float(size))
+
+
+def _speed(model, reference: Reference, rows: slice) -> np.ndarray:
+    """Mean velocity (nv,) over a few rows, which noise of single rows does not reach."""
+    part = reference.joint_q[rows]
+    return difference(model, part[:-1], part[1:]).mean(axis=0) / reference.timestep
 
 
 def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:

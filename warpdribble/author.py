@@ -84,12 +84,12 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
     style = replace(style, period=period)
     ball_body = model.body("ball")
     radius = next(s.size[0] for s in model.shapes if s.body == ball_body)
-    flight, ball_height, palm_height = _stroke(style, radius)
+    flight, ball_height, palm_height = stroke(style, radius)
     phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
 
-    joint_q = np.tile(_fingers(model, style.curl), (steps + 1, 1))
-    _trunk(model, joint_q, style, phase)
-    _legs(model, joint_q, style)
+    joint_q = np.tile(fingers(model, style.curl), (steps + 1, 1))
+    trunk(model, joint_q, style, phase)
+    legs(model, joint_q, style)
     _left_arm(model, joint_q, phase)
     under = np.tile([*style.ball_place, -radius], (steps + 1, 1))
     under[:, 2] += palm_height(times % period)
@@ -140,7 +140,7 @@ def _cycle(style: Dribble, radius: float, v: float):
     return down, up, catch, back, k, end - style.release_height
 
 
-def _stroke(style: Dribble, radius: float):
+def stroke(style: Dribble, radius: float):
     """Heights of the ball and of the palm as functions of the time since the release."""
     v = release_speed(style, radius)
     down, up, catch, back, k, _ = _cycle(style, radius, v)
@@ -171,18 +171,18 @@ def _stroke(style: Dribble, radius: float):
     return flight, ball, palm
 
 
-def _fingers(model, curl: float) -> np.ndarray:
-    """The start pose (nq,) with the right fingers part of the way from flat to it."""
+def fingers(model, curl: float, sides: str = "r") -> np.ndarray:
+    """The start pose (nq,) with the fingers of these sides part of the way from flat to it."""
     poses = np.stack([model.keyframes["flat"], model.start_q])
     joint_q = np.array(model.start_q, dtype=float)
     between = resample_q(model, poses, np.array([curl]))[0]
     for joint in model.joint_names:
-        if joint.startswith("r_") and joint.endswith(("_mcp", "_pip", "_dip")):
+        if joint[:2] in [f"{side}_" for side in sides] and joint.endswith(("_mcp", "_pip", "_dip")):
             joint_q[model.q_slice(joint)] = between[model.q_slice(joint)]
     return joint_q
 
 
-def _trunk(model, joint_q, style: Dribble, phase) -> None:
+def trunk(model, joint_q, style: Dribble, phase) -> None:
     root = model.q_slice(root_joint(model))
     joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
     joint_q[:, root.start + 1] = -0.01
@@ -198,7 +198,7 @@ def _trunk(model, joint_q, style: Dribble, phase) -> None:
         joint_q[:, place] = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
 
 
-def _legs(model, joint_q, style: Dribble) -> None:
+def legs(model, joint_q, style: Dribble) -> None:
     zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
     for side, (forward, left, out) in zip("lr", style.feet):
         ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])

@@ -4,6 +4,7 @@ analytic shapes alike."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import trimesh
@@ -31,14 +32,7 @@ def shape_mesh(shape) -> Mesh:
     shape: an object with kind, size, pos and quat as `sims.Model.shapes` has. Raises ValueError for
     other kinds.
     """
-    if shape.kind == "sphere":
-        mesh = _sphere(shape.size[0])
-    elif shape.kind == "capsule":
-        mesh = _capsule(shape.size[0], shape.size[1])
-    elif shape.kind == "box":
-        mesh = _box(np.asarray(shape.size[:3], dtype=float))
-    else:
-        raise ValueError(f"shape '{shape.name}': no mesh for the kind '{shape.kind}'")
+    mesh = _plain(shape.kind, tuple(float(v) for v in shape.size), shape.name)
     turn = Rotation.from_quat(shape.quat)
     return Mesh(turn.apply(mesh.points) + shape.pos, turn.apply(mesh.normals), mesh.faces)
 
@@ -51,6 +45,16 @@ def merge(meshes: list[Mesh]) -> Mesh:
         np.concatenate([m.normals for m in meshes]),
         np.concatenate([m.faces + start for m, start in zip(meshes, starts)]),
     )
+
+
+def weld(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) without copies of any, and the faces among them."""
+    rounded = np.ascontiguousarray(np.round(mesh.points, 7) + 0.0)
+    keys = rounded.view([("", rounded.dtype)] * 3).ravel()
+    _, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
+    if len(first) == len(mesh.points):
+        return mesh.points, mesh.faces
+    return mesh.points[first], inverse.reshape(-1)[mesh.faces]
 
 
 def faces_of(mesh: Mesh, chosen: np.ndarray) -> Mesh:
@@ -66,6 +70,18 @@ def ball_seams(mesh: Mesh) -> np.ndarray:
     opening = np.radians(42.0) + np.radians(10.0) * np.cos(2.0 * np.arctan2(z, x))
     curved = np.abs(np.arccos(np.abs(y)) - opening)
     return np.minimum(np.minimum(np.abs(x), np.abs(z)), curved) < SEAM_HALF_WIDTH
+
+
+@lru_cache(maxsize=256)
+def _plain(kind: str, size: tuple[float, ...], name: str) -> Mesh:
+    """The surface of a shape in its own frame; made once, as trimesh takes a millisecond for each."""
+    if kind == "sphere":
+        return _sphere(size[0])
+    if kind == "capsule":
+        return _capsule(size[0], size[1])
+    if kind == "box":
+        return _box(np.array(size[:3]))
+    raise ValueError(f"shape '{name}': no mesh for the kind '{kind}'")
 
 
 def _sphere(radius: float) -> Mesh:
@@ -89,9 +105,7 @@ def _box(half: np.ndarray) -> Mesh:
     inner = half - radius
     steps = np.linspace(0.0, np.pi / 2.0, 5)
     theta, phi = (a.ravel() for a in np.meshgrid(steps, steps))
-    octant = np.stack(
-        [np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=1
-    )
+    octant = np.stack([np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=1)
     octant = np.unique(np.round(octant, 12), axis=0)
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
     normals = np.concatenate([octant * s for s in signs])

@@ -12,11 +12,12 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .bvh import ClipError, read_bvh
+from .clips import ClipError, read_part
 from .sims import gaps, pose
 from .sims.feedforward import leading_targets
+from .sims.mapping import MappingError, find_mapping, read_mapping
 from .sims.reference import Reference, difference, root_joint
-from .sims.retarget import CMU, retarget
+from .sims.retarget import retarget
 from .sims.simulation import NONFINITE
 
 ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
@@ -67,38 +68,30 @@ class Run:
         """How often the player went down."""
         return int(np.sum(self.fallen[1:] & ~self.fallen[:-1]))
 
+    def root_paths(self, model) -> tuple[np.ndarray, np.ndarray]:
+        """Where the root was, and where the reference has it: two times (frames, 3) [m]."""
+        root = pose.joint_body(model, root_joint(model))
+        return self.body_q[:, root, :3], pose.forward(model, self.reference.joint_q)[:, root, :3]
+
     @property
     def real_time_factor(self) -> float:
         """Simulated seconds per second."""
         return self.reference.duration / max(self.wall_time, 1e-9)
 
 
-def load_clip(model, path: str | Path, frames=(0, -1)) -> tuple[Reference, list[str]]:
-    """A recorded clip on the model, and notes.
-
-    frames: (first, last), both included; a last of -1 is the clip's. Raises ClipError.
-    """
-    motion, notes = read_bvh(path)
-    first, last = frames
-    last = motion.frame_count - 1 if last == -1 else last
-    if not 0 <= first < last < motion.frame_count:
-        raise ClipError(
-            path,
-            f"--frames {first} {last} is not a range in it: "
-            f"give two rising numbers from 0 to {motion.frame_count - 1}",
-        )
-    motion = motion.slice(first, last)
+def load_clip(
+    model, path: str | Path, frames=(0, -1), repairs: str = "", mapping: str = "", **reading
+) -> tuple[Reference, list[str]]:
+    """A recorded clip on the model, and notes. frames, repairs, reading: as in `clips.read_part`; mapping:
+    shipped name or file, empty for the shipped one that fits. Raises ClipError."""
+    motion, notes = read_part(path, frames, repairs, **reading)
     if motion.duration < 2 * model.timestep:
-        raise ClipError(path, f"frames {first} to {last} last only {motion.duration:.3f} s")
-    missing = sorted(set(CMU.bodies.values()) - set(motion.joint_names))
-    if missing:
-        raise ClipError(
-            path,
-            f"unknown joints: the retargeting map (CMU) needs {', '.join(missing[:4])}"
-            f"{', ...' if len(missing) > 4 else ''}; "
-            f"the clip has {', '.join(motion.joint_names[:6])}, ...",
-        )
-    return retarget(model, motion), notes
+        raise ClipError(path, f"its frames last only {motion.duration:.3f} s")
+    try:
+        wanted = read_mapping(mapping) if mapping else find_mapping(motion)
+        return retarget(model, motion, wanted), notes
+    except MappingError as error:
+        raise ClipError(path, str(error)) from None
 
 
 def dribbling_hand(model, reference: Reference) -> str:

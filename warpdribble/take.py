@@ -1,27 +1,28 @@
-"""A simulated take as USD: what moved, as anyone's viewer shows it.
+"""A simulated take as USD: what moved, as anyone's viewer shows it, and what it takes to simulate it again.
 
-Z up, metres, kilograms, one time code per frame, `/World` as the default prim with the player, the
-ball and the court below it. Every moving body is one Xform with translate and orient, as default
-value (frame 0) and as time samples; what is seen are meshes with normals, a bound UsdPreviewSurface
-and displayColor.
+Z up, metres, kilograms, one time code per frame, `/World` as the default prim with the player, the ball and
+the court below it. Every moving body is one Xform with translate and orient, as default value (frame 0) and
+as time samples; what is seen are meshes with normals, a bound UsdPreviewSurface and displayColor. Where the
+model is known, UsdPhysics says the rest (`usdphysics`). Read `docs/takes.md` for how it opens where.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import re
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdUtils, Vt
+from pxr import Sdf, Tf, Usd, UsdUtils
 
-from . import meshes, scene
+from . import crowd, figure, scene
 
 SUFFIXES = (".usda", ".usdc", ".usdz")
-SEAM_COLOUR = (0.05, 0.04, 0.04)
+LAYERS = {"animation": "usdc", "physics": "usda", "scene": "usdc"}
+"""Files beside a layered take, `<take>.<layer>.<suffix>`, strongest first."""
 
 
 class TakeError(ValueError):
@@ -40,23 +41,50 @@ class Take:
     """Objects with name, body (int, -1 = world), kind, size, pos, quat xyzw and rgba, as
     `sims.Model.shapes`."""
     body_q: np.ndarray
-    """(frames, bodies, 7) [m, -], position and quaternion xyzw of each body frame in the world."""
+    """(frames, bodies, 7) or (worlds, frames, bodies, 7) [m, -], position and quaternion xyzw of each body
+    frame in its world."""
     fps: float
     """Frames per second."""
     ball: str = "ball"
     """Name of the body shown as `/World/Ball`; all others belong to `/World/Player`."""
     notes: dict[str, str] = field(default_factory=dict)
     """Where the take comes from; stored as the layer's custom data."""
+    model: object = None
+    """The `sims.Model` that the bodies are of; without it a take has no physics and no skin."""
 
     def __post_init__(self):
-        if np.ndim(self.body_q) != 3 or np.shape(self.body_q)[1:] != (len(self.body_names), 7):
+        shape, count = np.shape(self.body_q), len(self.body_names)
+        if len(shape) not in (3, 4) or shape[-2:] != (count, 7):
             raise ValueError(
-                f"body_q is {np.shape(self.body_q)}, should be (frames, {len(self.body_names)}, 7)"
+                f"body_q is {shape}, should be (frames, {count}, 7) or (worlds, frames, {count}, 7)"
             )
-        if not len(self.body_q):
-            raise ValueError("a take needs at least one frame")
+        if 0 in shape:
+            raise ValueError(f"body_q is {shape}: a take needs at least one frame of one body")
         if not np.isfinite(self.body_q).all():
-            raise ValueError("body_q holds values that are not finite")
+            frame = int(np.argwhere(~np.isfinite(self.body_q))[0][-3])
+            raise ValueError(f"body_q holds values that are not finite, first in frame {frame}")
+        if np.any(np.linalg.norm(self.body_q[..., 3:], axis=-1) < 0.5):
+            raise ValueError("body_q holds quaternions of length 0")
+        if not (np.isfinite(self.fps) and self.fps > 0.0):
+            raise ValueError(f"fps is {self.fps}, should be above 0")
+        if self.model is not None and list(self.model.body_names) != list(self.body_names):
+            raise ValueError("body_names are not those of the model")
+
+    @classmethod
+    def of(cls, model, body_q, fps: float, **rest) -> Take:
+        """A take of a `sims.Model`, with its bodies, shapes and physics."""
+        return cls(list(model.body_names), model.shapes, body_q, fps, model=model, **rest)
+
+    @property
+    def worlds(self) -> np.ndarray:
+        """(worlds, frames, bodies, 7), whichever way body_q was given."""
+        return self.body_q if np.ndim(self.body_q) == 4 else np.asarray(self.body_q)[None]
+
+    def world(self, index: int) -> Take:
+        """The take of one world alone."""
+        import dataclasses
+
+        return dataclasses.replace(self, body_q=self.worlds[index])
 
 
 def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
@@ -65,154 +93,126 @@ def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Pa
     path = Path(path)
     if path.suffix not in suffixes:
         raise TakeError(path, f"name the output with one of {', '.join(suffixes)}")
-    if path.is_dir():
-        raise TakeError(path, "is a folder; give a file name")
     try:
+        if path.is_dir():
+            raise TakeError(path, "is a folder; give a file name")
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             pass
-    except OSError as error:
-        raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
+        with contextlib.suppress(FileNotFoundError):
+            os.lstat(path)  # says whether the name is too long, or none
+    except (OSError, ValueError) as error:
+        if isinstance(error, TakeError):
+            raise
+        raise TakeError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}") from None
     return path
 
 
 @contextlib.contextmanager
 def written_whole(path: Path):
-    """A temporary name beside `path` to write to: moved to `path` at the end, removed when
-    anything fails."""
+    """A temporary name beside `path` to write to: moved to `path` at the end, removed when anything fails.
+
+    Files that a writer leaves beside the temporary name are moved along, first.
+    """
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as folder:
         part = Path(folder) / path.name
         yield part
+        for other in sorted(Path(folder).iterdir()):
+            if other != part:
+                os.replace(other, path.parent / other.name)
         os.replace(part, path)
 
 
-def write_take(path: str | Path, take: Take) -> Path:
-    """Write a take as .usda, .usdc or .usdz; the file appears whole or not at all. Raises
-    TakeError."""
+def write_take(
+    path: str | Path,
+    take: Take,
+    *,
+    skin: bool = False,
+    joints: Literal["revolute", "d6", "spherical"] = "revolute",
+    layered: bool | None = None,
+    spacing: float = 3.0,
+) -> Path:
+    """Write a take as .usda, .usdc or .usdz; the file appears whole or not at all. Raises TakeError.
+
+    skin: one smooth skinned body over the player (UsdSkel) instead of a mesh per body. joints: how ball
+    joints are said in UsdPhysics, see `usdjoints`. layered: `take.usda` over `take.animation.usdc`,
+    `take.physics.usda` and `take.scene.usdc` instead of one file; by default a .usda is, as samples have no
+    place in text, and .usdc and .usdz are one file. spacing: [m] between worlds, which stand in a square.
+    """
     path = check_writable(path)
+    layered = path.suffix == ".usda" if layered is None else layered
+    if layered and path.suffix == ".usdz":
+        raise TakeError(path, "a package is one file; write layers as .usda or .usdc")
+    if skin and take.model is None:
+        raise TakeError(path, "a skin needs the take's model")
     try:
         with written_whole(path) as part:
             layer = part.with_suffix(".usdc") if path.suffix == ".usdz" else part
-            _write_layer(layer, take)
-            if path.suffix == ".usdz" and not UsdUtils.CreateNewUsdzPackage(str(layer), str(part)):
-                raise TakeError(path, "the usdz package could not be made")
+            _write(layer, take, skin, joints, layered, spacing)
+            if path.suffix == ".usdz":
+                if not UsdUtils.CreateNewUsdzPackage(str(layer), str(part)):
+                    raise TakeError(path, "the usdz package could not be made")
+                layer.unlink()
     except OSError as error:
         raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
     return path
 
 
 def validate(path: str | Path) -> list[str]:
-    """What OpenUSD's own validators say against a file: one line each, empty when it is clean."""
+    """What OpenUSD's own validators say against a file: one line each, empty when it is clean.
+
+    Wheels of usd-core up to 25.11 miss the file that names UsdPreviewSurface, and hold it against every take:
+    that is left out.
+    """
     from pxr import UsdValidation
 
-    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    errors = UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
-    return [f"{e.GetName()}: {e.GetMessage()}" for e in errors]
-
-
-def _write_layer(path: Path, take: Take) -> None:
-    stage = Usd.Stage.CreateNew(str(path))
+    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    stage = Usd.Stage.Open(str(path))
     try:
-        frames = len(take.body_q)
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        stage.SetMetadata("kilogramsPerUnit", 1.0)
-        stage.SetTimeCodesPerSecond(take.fps)
-        stage.SetFramesPerSecond(take.fps)
-        stage.SetStartTimeCode(0)
-        stage.SetEndTimeCode(frames - 1)
-        stage.GetRootLayer().customLayerData = dict(take.notes)
-
-        world = UsdGeom.Xform.Define(stage, "/World").GetPrim()
-        stage.SetDefaultPrim(world)
-        Usd.ModelAPI(world).SetKind(Kind.Tokens.assembly)
-        moving = [b for i, b in enumerate(take.body_names) if any(s.body == i for s in take.shapes)]
-        paths = {b: f"/World/Player/{prim_name(b)}" for b in moving if b != take.ball}
-        if paths:
-            _component(stage, "/World/Player")
-        if take.ball in moving:
-            paths[take.ball] = "/World/Ball"
-            _component(stage, "/World/Ball")
-        for name, prim in paths.items():
-            index = take.body_names.index(name)
-            UsdGeom.Xform.Define(stage, prim)
-            own = [s for s in take.shapes if s.body == index]
-            _visuals(stage, prim, prim_name(name), own, seams=name == take.ball)
-        _animate(stage, take, paths)
-
-        static = [s for s in take.shapes if s.body < 0 and s.kind != "plane"]
-        path_of_bodies = take.body_q[:, :, :3].reshape(-1, 3)
-        scene.add_surroundings(stage, path_of_bodies)
-        if static:
-            _visuals(stage, "/World/Court", "fixed", static, seams=False)
-        stage.GetRootLayer().Save()
-    finally:
-        del stage
+        errors = context.Validate(stage)
+    except Tf.ErrorException:  # said once, where the file is missing
+        errors = context.Validate(stage)
+    said = [f"{e.GetName()}: {e.GetMessage()}" for e in errors]
+    return [s for s in said if not s.startswith("MissingShaderIdInRegistry: shaderId 'UsdPreviewSurface'")]
 
 
-def prim_name(name: str) -> str:
-    """A body's name as a legal USD prim name."""
-    return re.sub(r"^(?=\d)|[^A-Za-z0-9_]", "_", name) or "_"
+def _write(path: Path, take: Take, skin: bool, joints: str, layered: bool, spacing: float) -> None:
+    """A stage is built in memory and exported, so that no layer of a used name is in the way."""
+    root = Sdf.Layer.CreateAnonymous(".usda" if path.suffix == ".usda" else ".usdc")
+    stage = Usd.Stage.Open(root)
+    layers = dict.fromkeys(LAYERS, root)
+    if layered:
+        layers = {name: Sdf.Layer.CreateAnonymous(f".{kind}") for name, kind in LAYERS.items()}
+        root.subLayerPaths = [layer.identifier for layer in layers.values()]
+    frames = take.worlds.shape[1]
+    for layer in {root, *layers.values()}:
+        scene.set_metadata(layer, frames, take.fps)
+    root.customLayerData = {str(k): str(v) for k, v in take.notes.items()}
+
+    edit = {name: Usd.EditTarget(layer) for name, layer in layers.items()}
+    stage.SetEditTarget(edit["scene"])
+    scene.define_world(stage)
+    if len(take.worlds) == 1:
+        figure.add(stage, "/World", take.world(0), edit, skin, joints)
+        places = take.worlds[0]
+    else:
+        places = crowd.add(stage, take, edit, skin, joints, spacing)
+    stage.SetEditTarget(edit["scene"])
+    scene.add_surroundings(stage, places[..., :3].reshape(-1, 3))
+    figure.add_static(stage, take, edit)
+    del stage
+    if layered:
+        names = {name: path.with_suffix(f".{name}.{kind}") for name, kind in LAYERS.items()}
+        for name, layer in layers.items():
+            _export(layer, names[name])
+        root.subLayerPaths = [f"./{file.name}" for file in names.values()]
+    _export(root, path)
 
 
-def _component(stage, path):
-    Usd.ModelAPI(UsdGeom.Xform.Define(stage, path).GetPrim()).SetKind(Kind.Tokens.component)
-
-
-def _animate(stage, take: Take, paths: dict[str, str]) -> None:
-    """Translate and orient of every body: default = frame 0, and a sample per frame, written
-    below the stage's API."""
-    layer = stage.GetRootLayer()
-    positions = take.body_q[:, :, :3].astype(float)
-    quats = continuous_quaternions(take.body_q[:, :, 3:])
-    with Sdf.ChangeBlock():
-        for name, path in paths.items():
-            body = take.body_names.index(name)
-            prim = layer.GetPrimAtPath(path)
-            move = Sdf.AttributeSpec(prim, "xformOp:translate", Sdf.ValueTypeNames.Double3)
-            turn = Sdf.AttributeSpec(prim, "xformOp:orient", Sdf.ValueTypeNames.Quatf)
-            order = Sdf.AttributeSpec(
-                prim, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform
-            )
-            order.default = Vt.TokenArray([move.name, turn.name])
-            translations = [Gf.Vec3d(*p) for p in positions[:, body].tolist()]
-            orientations = [Gf.Quatf(w, x, y, z) for x, y, z, w in quats[:, body].tolist()]
-            move.default, turn.default = translations[0], orientations[0]
-            for frame, (t, r) in enumerate(zip(translations, orientations)):
-                layer.SetTimeSample(move.path, frame, t)
-                layer.SetTimeSample(turn.path, frame, r)
-
-
-def continuous_quaternions(quaternions: np.ndarray) -> np.ndarray:
-    """The same rotations (frames, ..., 4), normalised, with signs so that neighbouring frames
-    are near each other."""
-    quaternions = quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
-    signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
-    quaternions[1:] *= signs[..., None]
-    return quaternions
-
-
-def _visuals(stage, parent: str, name: str, shapes: list, seams: bool) -> None:
-    """One mesh per colour of a body's shapes, named `<body>_visual`, `<body>_visual_2`, ...
-
-    Seams are a mesh of their own: Blender gives faces outside a material subset the first subset's
-    material.
-    """
-    colours = list(dict.fromkeys(tuple(np.round(s.rgba, 4).tolist()) for s in shapes))
-    drawn = 0
-    for colour in colours:
-        mesh = meshes.merge(
-            [meshes.shape_mesh(s) for s in shapes if tuple(np.round(s.rgba, 4).tolist()) == colour]
-        )
-        parts = [(mesh, colour)]
-        if seams:
-            seam = meshes.ball_seams(mesh)
-            parts = [
-                (meshes.faces_of(mesh, ~seam), colour),
-                (meshes.faces_of(mesh, seam), SEAM_COLOUR),
-            ]
-        for part, part_colour in parts:
-            drawn += 1
-            path = f"{parent}/{name}_visual" + (f"_{drawn}" if drawn > 1 else "")
-            scene.add_mesh(stage, path, part, part_colour[:3])
+def _export(layer: Sdf.Layer, path: Path) -> None:
+    try:
+        done = layer.Export(str(path))
+    except Tf.ErrorException as error:
+        raise OSError(None, str(error).splitlines()[0]) from None
+    if not done:
+        raise OSError(None, "the layer could not be exported")

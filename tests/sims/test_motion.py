@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -86,6 +88,23 @@ def test_slice_includes_both_ends_and_refuses_what_is_not_there():
     for first, last in ((-1, 5), (5, 5), (6, 5), (0, 25)):
         with pytest.raises(ValueError, match="not a range"):
             motion.slice(first, last)
+
+
+def test_what_only_some_formats_record_goes_along():
+    plain, frames = wave(), 25
+    assert plain.slice(3, 10).ball is None and plain.resample(100.0).positions is None
+    ball = np.linspace([0.0, 0.0, 1.0], [2.4, 0.0, 1.0], frames)
+    held = np.arange(frames) < 10
+    motion = replace(plain, ball=ball, ball_held=held, positions=plain.forward()[0])
+    part = motion.slice(3, 12)
+    assert np.array_equal(part.ball, ball[3:13]) and np.array_equal(part.ball_held, held[3:13])
+    assert np.array_equal(part.positions, motion.positions[3:13])
+    fine = motion.resample(4 * motion.rate)
+    assert np.allclose(fine.ball[:, 0], np.linspace(0.0, 2.4, 97))
+    assert fine.ball_held.dtype == bool and fine.ball_held[:37].all() and not fine.ball_held[39:].any()
+    assert np.allclose(fine.positions[::4], motion.positions)
+    with pytest.raises(ValueError, match="ball is"):
+        replace(motion, ball=ball[:-1])
 
 
 def test_an_unknown_joint_is_named_with_those_there_are():

@@ -1,8 +1,11 @@
 """A small clip written like the CMU conversion: same joints, units, T-pose row and lost bone
 lengths."""
 
+import zipfile
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 SIDE = {
     "{}HipJoint": ("Hips", (0, 0, 0)),
@@ -102,3 +105,111 @@ def cmu_clip(tmp_path):
     path = tmp_path / "clip.bvh"
     path.write_text(bvh_text(skeleton(), dribbling_angles(frames), root))
     return path
+
+
+@pytest.fixture
+def ballplay_clip(tmp_path):
+    """Path of a BallPlay-M clip of 30 frames: arms spread, turned a quarter about the vertical, the ball
+    falling, in hand for the first 10 frames."""
+    from warpdribble.ballplay import COLUMNS, SKELETON, TO_MOTION
+
+    rows = np.zeros((30, COLUMNS), np.float32)
+    turn = Rotation.from_rotvec([0.0, 0.0, np.pi / 2]) * Rotation.from_matrix(TO_MOTION)
+    rows[:, 3:6] = rows[:, 6:9] = turn.as_rotvec()
+    at = {}
+    for name, (parent, offset) in SKELETON.items():
+        side = 1.0 if name.startswith("L_") else -1.0
+        offset = (0.03 * side, 0.0, 0.0) if offset is None else offset
+        at[name] = turn.apply(offset) + (at[parent] if parent else [1.0, 2.0, 0.95])
+    rows[:, 165:324] = np.concatenate(list(at.values()))
+    rows[:, 324:327] = np.array([1.3, 2.0, 1.2]) - np.arange(30)[:, None] * [0.0, 0.0, 0.02]
+    rows[:10, 336] = 1.0
+    path = tmp_path / "clip.pt"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("archive/data.pkl", b"\x80\x02ctorch\nFloatStorage\nq\x02.")
+        archive.writestr("archive/data/0", rows.tobytes())
+        archive.writestr("archive/version", b"3\n")
+    return path
+
+
+ASF = """# a pelvis with a leg of two bones
+:version 1.10
+:units
+  mass 1.0
+  length 1.0
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name thigh
+    direction 1 0 0
+    length 2
+    axis 0 0 90 XYZ
+    dof rx
+    limits (-160.0 20.0)
+  end
+  begin
+    id 2
+    name shin
+    direction 0 1 0
+    length 3
+    axis 0 0 0 XYZ
+    dof rx ry rz
+    limits (-10.0 170.0)
+           (-10.0 170.0)
+           (-10.0 170.0)
+  end
+:hierarchy
+  begin
+    root thigh
+    thigh shin
+  end
+"""
+AMC = """#!OML:ASF
+:FULLY-SPECIFIED
+:DEGREES
+1
+root 0 0 0 0 0 0
+thigh 0
+shin 0 0 0
+2
+root 10 20 30 0 0 0
+thigh 90
+shin 0 0 0
+3
+root 0 0 0 0 0 90
+thigh 0
+shin 90 0 90
+"""
+
+
+@pytest.fixture
+def amc_clip(tmp_path):
+    """Path of a clip of 3 frames, its skeleton beside it."""
+    (tmp_path / "01.asf").write_text(ASF)
+    path = tmp_path / "01_01.amc"
+    path.write_text(AMC)
+    return path
+
+
+@pytest.fixture(scope="session")
+def shipped_player():
+    from warpdribble.sims import Model
+
+    return Model.load("player")
+
+
+@pytest.fixture(scope="session")
+def dribble_take(shipped_player):
+    """The authored dribble as a take of 36 frames at 50 fps, with its physics."""
+    from warpdribble.author import dribble_right
+    from warpdribble.sims import pose
+    from warpdribble.take import Take
+
+    joint_q = dribble_right(shipped_player).reference.joint_q[::2]
+    return Take.of(shipped_player, pose.forward(shipped_player, joint_q), 50.0, notes={"clip": "authored"})

@@ -81,7 +81,7 @@ def test_model_without_the_player_s_bodies(capsys, tmp_path, cmu_clip):
     model.write_text(OTHER)
     out = tmp_path / "t.usdc"
     said = refused(capsys, tmp_path, "simulate", cmu_clip, "--model", model, "--out", out)
-    assert "no joint 'l_elbow'" in said
+    assert "no body 'pelvis'" in said
 
 
 def test_missing_model(capsys, tmp_path, cmu_clip):
@@ -119,10 +119,31 @@ def test_demo_leaves_a_valid_take_and_a_picture(capsys, tmp_path):
     out = tmp_path / "new" / "demo.usdc"
     assert main(["demo", "--repeat", "2", "--out", str(out)]) == 0
     assert validate(out) == []
-    assert sorted(p.name for p in out.parent.iterdir()) == ["demo.png", "demo.usdc"]
+    beside = ["demo.html", "demo.plots.png", "demo.png", "demo.usdc"]
+    assert sorted(p.name for p in out.parent.iterdir()) == beside
     said = capsys.readouterr().out
     for word in ("real time", "tracking", "falls", "bounces", "next", str(out)):
         assert word in said
+
+
+def test_a_take_as_asked_for(capsys, tmp_path):
+    from pxr import Usd
+
+    out = tmp_path / "as" / "demo.usda"
+    arguments = ["demo", "--repeat", "1", "--skin", "--usd-joints", "d6", "--no-html", "--out", str(out)]
+    assert main(arguments) == 0
+    assert validate(out) == []
+    layers = [f"demo.{name}" for name in ("animation.usdc", "physics.usda", "plots.png", "png", "scene.usdc")]
+    assert sorted(p.name for p in out.parent.iterdir()) == [*layers, "demo.usda"]
+    stage = Usd.Stage.Open(str(out))
+    assert stage.GetPrimAtPath("/World/Player/Skin/Body_visual")
+    assert stage.GetPrimAtPath("/World/Player/Joints/l_hip").GetTypeName() == "PhysicsJoint"
+    assert "replay" not in capsys.readouterr().out
+
+
+def test_unknown_joints(capsys, tmp_path):
+    said = refused(capsys, tmp_path, "demo", "--usd-joints", "rubber", "--out", tmp_path / "t.usdc")
+    assert "--help" in said
 
 
 def test_a_clip_becomes_a_valid_take(capsys, tmp_path, cmu_clip):

@@ -4,11 +4,17 @@ A new command is a dataclass with a `run() -> int` (the exit status) and a line 
 wrong with the input is raised as ValueError or OSError, its message one line that says what to do.
 """
 
+from .fetch import Fetch
+from .motion import MotionGroup
 from .simulate import Demo, Simulate
+from .skill import SkillGroup
 
 COMMANDS = {
     "simulate": Simulate,
     "demo": Demo,
+    "motion": MotionGroup,
+    "fetch": Fetch,
+    "skill": SkillGroup,
 }
 
 __all__ = ["COMMANDS"]

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from tyro.conf import Positional
-
+from .clip_input import ClipInput
 from .console import bar, check_device, quiet_warp, ready, say
 
 LONGEST = 600.0
@@ -17,19 +16,27 @@ SHORT = 60.0
 
 
 @dataclass
-class Simulate:
-    """Let a simulated player follow a recorded clip; write a USD take and a picture."""
+class Simulate(ClipInput):
+    """Let a simulated player follow a recorded clip or a skill; write a USD take and a picture.
 
-    clip: Positional[Path]
-    """Recorded clip, a .bvh file."""
-    frames: tuple[int, int] = (0, -1)
-    """First and last frame of the part to use, counted from 0; -1 is the clip's last."""
+    In place of a clip: the name of a skill (warpdribble skill list) or a skill's .toml file.
+    """
+
     repeat: int = 1
     """How many times in a row; the ends are made to meet."""
+    mapping: str = ""
+    """Names of the skeleton's joints: cmu, ballplay, mixamo, lafan, or your own .toml file; told from the
+    clip when empty."""
     root: Literal["free", "tracked"] = "free"
     """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too."""
     out: Path = Path("out/take.usdc")
-    """The take: .usda, .usdc or .usdz. The picture goes beside it, as .png."""
+    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
+    skin: bool = False
+    """One smooth body over the player, in the take and the replay, instead of its shapes."""
+    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
+    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
+    html: bool = True
+    """Write the replay, a page for any browser, beside the take."""
     model: str = "player"
     """The player, or the path of an MJCF file with the same body names."""
     device: str = "cpu"
@@ -51,7 +58,13 @@ class Demo:
     root: Literal["free", "tracked"] = "free"
     """free: only the joints are driven. tracked: virtual forces hold the pelvis too."""
     out: Path = Path("out/demo.usdc")
-    """The take: .usda, .usdc or .usdz. The picture goes beside it, as .png."""
+    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
+    skin: bool = False
+    """One smooth body over the player, in the take and the replay, instead of its shapes."""
+    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
+    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
+    html: bool = True
+    """Write the replay, a page for any browser, beside the take."""
     device: str = "cpu"
     """Where to simulate: cpu, cuda:0, ..."""
 
@@ -71,7 +84,8 @@ def _check(command: Simulate | Demo) -> None:
     check_device(command.device)
     quiet_warp()
     check_writable(command.out)
-    check_writable(command.out.with_suffix(".png"), (".png",))
+    for other in (".png", ".plots.png", ".html"):
+        check_writable(command.out.with_suffix(other), (".png", ".html"))
 
 
 def _demo(command: Demo, model) -> int:
@@ -95,8 +109,11 @@ def _demo(command: Demo, model) -> int:
 def _simulate(command: Simulate, model) -> int:
     from ..sims.reference import close_cycle
     from ..simulate import ball_from_hand, dribbling_hand, load_clip
+    from ..skills import is_skill
 
-    reference, notes = load_clip(model, command.clip, command.frames)
+    if is_skill(command.clip):
+        return _simulate_skill(command, model)
+    reference, notes = load_clip(model, mapping=command.mapping, **command.reading())
     _check_length(reference, command.repeat)
     first, last = command.frames
     part = f"frames {first} to {'the last' if last < 0 else last}"
@@ -114,6 +131,27 @@ def _simulate(command: Simulate, model) -> int:
     return 0
 
 
+def _simulate_skill(command: Simulate, model) -> int:
+    from ..play import play
+    from ..simulate import ball_in_reference
+    from ..skills import skill
+
+    one = play(model, skill(command.clip))
+    reference = one.reference
+    say(f"skill     {one.skill.name}: {one.skill.description}, {reference.duration:.2f} s")
+    for note in one.notes:
+        say(f"          {note}")
+    _check_length(reference, command.repeat)
+    if command.repeat > 1:
+        if one.cycle is None:
+            raise ValueError(f"--repeat {command.repeat}: the skill '{one.skill.name}' is not cyclic")
+        reference = one.cycle.repeat(model, command.repeat)
+    has_ball = one.ball is not None and "ball" in model.body_names
+    ball = ball_in_reference(model, reference) if has_ball else None
+    _finish(command, model, reference, ball, f"skill {one.skill.name}")
+    return 0
+
+
 def _check_length(reference, repeat: int) -> None:
     """Raise ValueError where a take would not fit into memory."""
     most = max(1, int(LONGEST / reference.duration))
@@ -124,6 +162,8 @@ def _check_length(reference, repeat: int) -> None:
 def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> None:
     """Simulate, say how it went, and write the take and its picture."""
     from .. import __version__
+    from ..plots import write_plots
+    from ..replay import write_replay
     from ..sheet import write_sheet
     from ..simulate import TRIES, simulate
     from ..take import Take, validate, write_take
@@ -133,10 +173,9 @@ def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> No
     with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
         run = simulate(sim, reference, command.root, ball, progress)
     _summary(run, command)
-    take = Take(
-        body_names=list(model.body_names),
-        shapes=model.shapes,
-        body_q=run.body_q,
+    take = Take.of(
+        model,
+        run.body_q,
         fps=1.0 / model.timestep,
         notes={"creator": f"warpdribble {__version__}", "clip": source, "root": command.root},
     )
@@ -146,12 +185,20 @@ def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> No
         if body in model.body_names
     }
     picture = command.out.with_suffix(".png")
-    write_take(command.out, take)
-    write_sheet(picture, take, heights, run.contacts, f"{source}, root {command.root}")
+    plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
+    title = f"{source}, root {command.root}"
+    write_take(command.out, take, skin=command.skin, joints=command.usd_joints)
+    write_sheet(picture, take, heights, run.contacts, title)
+    roots = run.root_paths(model)
+    write_plots(plots, take.fps, *roots, run.angle_error, run.position_error, run.fallen, title)
+    if command.html:
+        write_replay(replay, take, run.contacts, title, skin=command.skin)
     errors = validate(command.out)
     state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
     say(f"take      {command.out} ({len(take.body_q)} frames at {take.fps:g} fps, {state})")
-    say(f"picture   {picture}")
+    say(f"pictures  {picture}, {plots.name}")
+    if command.html:
+        say(f"replay    {replay} (open it in a browser)")
 
 
 def _summary(run, command) -> None:

@@ -1,0 +1,107 @@
+"""`warpdribble skill list`, `show` and `draft`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, subcommand
+
+from .console import say
+
+
+@dataclass
+class List:
+    """The skills that ship, and whether their clips are here."""
+
+    def run(self) -> int:
+        from ..play import find_clip
+        from ..skills import SkillError, skill, skill_names
+
+        for name in skill_names():
+            one = skill(name)
+            where = f"authored {one.authored}"
+            if one.clip:
+                where = f"{one.clip} {one.frames[0]}-{one.frames[1]}"
+                try:
+                    find_clip(one)
+                except SkillError:
+                    where += " (not here: warpdribble fetch)"
+            say(f"{name:22} {'cycle ' if one.cyclic else 'once  '} {one.description}")
+            say(f"{'':22}        {where}")
+        return 0
+
+
+@dataclass
+class Show:
+    """What a skill is on the player: length, contacts, checkpoints, or what is wrong with its file."""
+
+    skill: Positional[str]
+    """Name of a shipped skill, or a .toml file."""
+
+    def run(self) -> int:
+        from ..play import play
+        from ..sims import Model
+        from ..skills import skill
+
+        model = Model.load("player")
+        one = play(model, skill(self.skill))
+        say(f"{one.skill.name}: {one.skill.description}")
+        for note in one.notes:
+            say(f"  {note}")
+        step = one.reference.timestep
+        say(f"  {one.reference.duration:.2f} s, {one.reference.frame_count} rows")
+        if one.cycle is not None:
+            turn, (x, y) = 57.2958 * one.cycle.turn, one.cycle.travel
+            say(f"  per cycle: turns {turn:.0f} degrees, travels {x:.2f} m ahead and {y:.2f} m left")
+        if one.ball is not None:
+            for hand, spans in one.ball.contact(step).items():
+                say(f"  {hand} hand: {', '.join(f'{a:.2f}-{b:.2f}' for a, b in spans)} s")
+            tops = zip(one.ball.checkpoints, one.ball.heights)
+            say(f"  checkpoints: {', '.join(f'{r * step:.2f} s at {h:.2f} m' for r, h in tops) or 'none'}")
+        return 0
+
+
+@dataclass
+class Draft:
+    """Write a first version of a skill from a clip: its best cycle, contacts, checkpoints, heights."""
+
+    clip: Positional[Path]
+    """Recorded clip."""
+    out: Path = Path("skill.toml")
+    """The file to write."""
+    frames: tuple[int, int] | None = None
+    """First and last frame to use; by default the best cycle that is found."""
+    whole: bool = False
+    """Use the whole clip, not its best cycle."""
+    name: str = ""
+    """Of the skill; the clip's when empty."""
+    mapping: str = ""
+    """Names of the skeleton's joints, as for motion retarget."""
+
+    def run(self) -> int:
+        from ..draft import draft, write_draft
+        from ..sims import Model
+        from ..skills import parse_skill
+
+        text = draft(Model.load("player"), self.clip, self.frames, self.name, self.mapping, self.whole)
+        parse_skill(text, str(self.out))
+        write_draft(self.out, text)
+        say(text.rstrip())
+        say(f"written   {self.out}: look at it, then warpdribble simulate {self.out} --repeat 5")
+        return 0
+
+
+@dataclass
+class SkillGroup:
+    """Skills: skill list, skill show NAME, skill draft CLIP --out FILE."""
+
+    do: (
+        Annotated[List, subcommand("list")]
+        | Annotated[Show, subcommand("show")]
+        | Annotated[Draft, subcommand("draft")]
+    )
+
+    def run(self) -> int:
+        return self.do.run()

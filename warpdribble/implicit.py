@@ -1,0 +1,110 @@
+"""A smooth union of primitives, as a field that is zero on its surface.
+
+The field is F(x) = log sum_i exp(-d_i(x) / k_i), with d_i the distance to primitive i and k_i how far it
+blends: 0 on the surface, positive inside (Wyvill's soft objects with an exponential fall-off).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+OUTSIDE = -12.0
+"""F where no primitive is near."""
+FAR = 1.0
+"""[m]"""
+
+
+class Union:
+    """Primitives placed in space. lumps: as `flesh.Lump`; frames: (nbody, 7), body frames by index."""
+
+    def __init__(self, lumps, body_of: dict[str, int], frames: np.ndarray):
+        self.lumps = lumps
+        self.bodies = np.array([body_of[lump.body] for lump in lumps])
+        self.origins = frames[self.bodies, :3]
+        self.turns = Rotation.from_quat(frames[self.bodies, 3:]).as_matrix()
+
+    def local(self, i: int, points: np.ndarray) -> np.ndarray:
+        return (points - self.origins[i]) @ self.turns[i]
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """(primitives, points) [m], negative inside; FAR where a primitive is not near."""
+        found = np.full((len(self.lumps), len(points)), FAR)
+        for i, near in enumerate(self.near(points)):
+            found[i, near] = distance(self.lumps[i], self.local(i, points[near]))
+        return found
+
+    def near(self, points: np.ndarray) -> list[np.ndarray]:
+        """For each primitive, the indices of the points that it may matter to, also when they move a
+        little."""
+        found = []
+        for i, lump in enumerate(self.lumps):
+            ends = self.origins[i] + np.stack([lump.p, lump.q]) @ self.turns[i].T
+            reach = max(lump.r) * max(lump.scale) + 5.0 * lump.blend + 0.02
+            found.append(
+                np.flatnonzero(
+                    np.all(
+                        np.abs(points - ends.mean(axis=0)) < 0.5 * np.abs(ends[1] - ends[0]) + reach, axis=1
+                    )
+                )
+            )
+        return found
+
+    def values(self, points: np.ndarray, near: list[np.ndarray]) -> np.ndarray:
+        """F (points,) of points (points, 3)."""
+        total = np.full(len(points), np.exp(OUTSIDE))
+        for i, who in enumerate(near):
+            d = distance(self.lumps[i], self.local(i, points[who]))
+            total[who] += np.exp(np.minimum(-d / self.lumps[i].blend, 60.0))
+        return np.log(total)
+
+    def slope(self, points: np.ndarray, near=None, step: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:
+        """F (points,) and its gradient (points, 3) [1/m], by differences."""
+        near = self.near(points) if near is None else near
+        here = self.values(points, near)
+        ahead = [self.values(points + step * e, near) for e in np.eye(3)]
+        return here, (np.stack(ahead, axis=1) - here[:, None]) / step
+
+    def project(self, points: np.ndarray, rounds: int, most: float = 0.01, near=None) -> np.ndarray:
+        """Points moved onto the surface along the gradient (Newton), at most `most` [m] a round."""
+        near = self.near(points) if near is None else near
+        for _ in range(rounds):
+            here, slope = self.slope(points, near)
+            move = here[:, None] * slope / np.maximum(np.sum(slope**2, axis=1), 1e-9)[:, None]
+            size = np.linalg.norm(move, axis=1, keepdims=True)
+            points = points - move * np.minimum(1.0, most / np.maximum(size, 1e-12))
+        return points
+
+    def on_grid(self, axes: list[np.ndarray]) -> np.ndarray:
+        """F on the grid of three rising coordinate lists; only the box around each primitive is visited."""
+        total = np.zeros([len(a) for a in axes], np.float32)
+        for i, lump in enumerate(self.lumps):
+            size = max(lump.r) * max(lump.scale)
+            reach = size + 5.0 * lump.blend
+            ends = self.origins[i] + np.stack([lump.p, lump.q]) @ self.turns[i].T
+            low, high = ends.min(axis=0) - reach, ends.max(axis=0) + reach
+            box = tuple(slice(*np.searchsorted(a, [lo, hi])) for a, lo, hi in zip(axes, low, high))
+            cut = [a[s] for a, s in zip(axes, box)]
+            if not all(map(len, cut)):
+                continue
+            points = np.stack(np.meshgrid(*cut, indexing="ij"), axis=-1).reshape(-1, 3)
+            d = distance(lump, self.local(i, points)).reshape([len(c) for c in cut])
+            total[box] += np.exp(np.minimum(-d / lump.blend, 60.0))
+        return np.log(np.maximum(total, np.exp(OUTSIDE)))
+
+
+def distance(lump, x: np.ndarray) -> np.ndarray:
+    """(points,) [m] to a primitive from points (points, 3) in its body's axes; near the surface to first
+    order."""
+    scale, p, q = np.asarray(lump.scale), np.asarray(lump.p), np.asarray(lump.q)
+    along = (q - p) / scale
+    size = max(float(along @ along), 1e-12)
+    y = (x - p) / scale
+    t = np.clip(y @ along / size, 0.0, 1.0)
+    away = y - t[:, None] * along
+    length = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+    radius = lump.r[0] + t * (lump.r[1] - lump.r[0])
+    d = (length - radius) * length / np.maximum(np.linalg.norm(away / scale, axis=1), 1e-9)
+    if lump.cut is not None:
+        d = np.maximum(d, x @ np.asarray(lump.cut[0]) - lump.cut[1])
+    return d

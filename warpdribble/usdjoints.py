@@ -1,0 +1,230 @@
+"""The joints of a model as UsdPhysics: frames, limits, drives and the roots of articulations.
+
+A hinge is a RevoluteJoint about the X axis of its frame. A ball joint is said in one of three ways:
+
+revolute
+    three RevoluteJoints between the same two bodies, about X, then Y, then Z: intrinsic Euler angles. MuJoCo
+    reads them as the hinges of one body, Newton as one joint of three axes; PhysX would take them for a loop.
+d6
+    one PhysicsJoint with locked translations, three limits and three drives: Omniverse, Isaac, Newton.
+spherical
+    one SphericalJoint with a cone limit; the schema has no drive for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Gf, Sdf, UsdGeom, UsdPhysics
+from scipy.spatial.transform import Rotation
+
+from .names import prim_names
+
+KINDS = ("revolute", "d6", "spherical")
+PER_DEGREE = np.pi / 180.0
+"""[rad] in a degree: a gain per radian times this is the gain per degree."""
+FREE, BALL = 0, 1
+AXES = "XYZ"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A place and a turn in the axes of something else."""
+
+    p: np.ndarray
+    """(3,) [m]"""
+    R: Rotation
+
+    def __matmul__(self, other: Frame) -> Frame:
+        return Frame(self.p + self.R.apply(other.p), self.R * other.R)
+
+    def inverse(self) -> Frame:
+        return Frame(-self.R.inv().apply(self.p), self.R.inv())
+
+
+WORLD = Frame(np.zeros(3), Rotation.identity())
+
+
+def add(stage, base: str, take, paths: dict[str, str], kind: str) -> None:
+    """Every joint of the model below `base`/Player/Joints. Drives hold the pose of frame 0."""
+    if kind not in KINDS:
+        raise ValueError(f"joints '{kind}': give one of {', '.join(KINDS)}")
+    model, body_q = take.model, take.worlds[0, 0]
+    where = f"{base}/Player/Joints"
+    legal = prim_names([*model.joint_names, *(f"{name} weld" for name in model.body_names)])
+    for body, name in enumerate(model.body_names):
+        if is_static(model, body):
+            continue
+        links = links_of(model, body)
+        parent = int(model.body_parent[body])
+        if len(links) == 1 and model.tables["link_joint"][links[0]] == FREE:
+            if body in model.body_parent:
+                UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[name]))
+            continue
+        if parent < 0 or is_static(model, parent):
+            UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[name]))
+        UsdGeom.Scope.Define(stage, where)
+        ends = (paths[model.body_names[parent]] if parent >= 0 else None, paths[name])
+        turn = _pose(body_q, parent).R.inv() * _pose(body_q, body).R
+        if not links:
+            frame = _in_link(model, parent).inverse() @ _in_link(model, body)
+            _joint(stage, UsdPhysics.FixedJoint, f"{where}/{legal[name + ' weld']}", ends, frame, WORLD)
+        for link, frame0, frame1 in _frames(model, parent, body, links):
+            path = f"{where}/{legal[model.joint_names[link - 1]]}"
+            _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind)
+
+
+def links_of(model, body: int) -> list[int]:
+    """The links (rows of the model's tables) of a body's joints, from its parent outwards; none when it is
+    welded."""
+    parent = int(model.body_parent[body])
+    top = int(model.tables["body_link"][parent]) if parent >= 0 else 0
+    links, link = [], int(model.tables["body_link"][body])
+    while link != top:
+        links.append(link)
+        link = int(model.tables["link_parent"][link])
+    return links[::-1]
+
+
+def is_static(model, body: int) -> bool:
+    """Whether a body is welded to the world."""
+    while body >= 0:
+        if links_of(model, body):
+            return False
+        body = int(model.body_parent[body])
+    return True
+
+
+def _pose(body_q, body: int) -> Frame:
+    return WORLD if body < 0 else Frame(body_q[body, :3], Rotation.from_quat(body_q[body, 3:]))
+
+
+def _in_link(model, body: int) -> Frame:
+    """A body's frame in that of its last link."""
+    if body < 0:
+        return WORLD
+    t = model.tables
+    return Frame(t["body_offset"][body], Rotation.from_quat(t["body_turn"][body]))
+
+
+def _frames(model, parent: int, body: int, links: list[int]):
+    """(link, its frame in the parent body, its frame in the body), all joints at zero."""
+    t = model.tables
+    frame, frames = _in_link(model, parent).inverse(), []
+    for link in links:
+        frame = frame @ Frame(t["link_offset"][link], Rotation.from_quat(t["link_turn"][link]))
+        frames.append(frame)
+    child = frames[-1] @ _in_link(model, body) if frames else frame
+    return [(link, f, child.inverse() @ f) for link, f in zip(links, frames)]
+
+
+def _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind) -> None:
+    t = model.tables
+    dof = int(t["link_dof"][link])
+    gains = float(t["dof_kp"][dof]), float(t["dof_kd"][dof]), float(t["link_effort"][link])
+    gains = gains if t["link_driven"][link] else None
+    limits = (float(t["link_lower"][link]), float(t["link_upper"][link])) if t["link_limited"][link] else None
+    armature = float(t["dof_armature"][dof])
+    at_start = frame0.R.inv() * turn * frame1.R
+    if t["link_joint"][link] != BALL:
+        axis = Rotation.align_vectors([t["link_axis"][link]], [[1.0, 0.0, 0.0]])[0]
+        zero = float(t["link_zero"][link])
+        angle = float((axis.inv() * at_start * axis).as_rotvec()[0])
+        limits = limits and (limits[0] - zero, limits[1] - zero)
+        _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle)
+        _extend(stage.GetPrimAtPath(path), armature, angle)
+        return
+    euler = at_start.as_euler("XYZ")
+    reach = limits and limits[1]
+    if kind == "revolute":
+        for k, angle in enumerate(euler):
+            axis = Rotation.align_vectors([np.eye(3)[k]], [[1.0, 0.0, 0.0]])[0]
+            both = reach and (-reach, reach)
+            part = f"{path}_{AXES[k].lower()}"
+            _revolute(stage, part, ends, frame0, frame1, axis, both, gains, angle)
+            _extend(stage.GetPrimAtPath(part), armature)
+    elif kind == "d6":
+        _d6(stage, path, ends, frame0, frame1, reach, gains, euler)
+        _extend(stage.GetPrimAtPath(path), armature)
+    else:
+        joint = _joint(stage, UsdPhysics.SphericalJoint, path, ends, frame0, frame1)
+        joint.CreateAxisAttr(_bone_axis(model, link))
+        if reach:
+            joint.CreateConeAngle0LimitAttr(min(np.degrees(reach), 179.0))
+            joint.CreateConeAngle1LimitAttr(min(np.degrees(reach), 179.0))
+
+
+def _joint(stage, schema, path: str, ends, frame0: Frame, frame1: Frame):
+    joint = schema.Define(stage, path)
+    if ends[0]:
+        joint.CreateBody0Rel().SetTargets([ends[0]])
+    joint.CreateBody1Rel().SetTargets([ends[1]])
+    joint.CreateLocalPos0Attr(Gf.Vec3f(*frame0.p.tolist()))
+    joint.CreateLocalPos1Attr(Gf.Vec3f(*frame1.p.tolist()))
+    joint.CreateLocalRot0Attr(_quatf(frame0.R))
+    joint.CreateLocalRot1Attr(_quatf(frame1.R))
+    return joint
+
+
+def _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle) -> None:
+    aside = Frame(np.zeros(3), axis)
+    joint = _joint(stage, UsdPhysics.RevoluteJoint, path, ends, frame0 @ aside, frame1 @ aside)
+    joint.CreateAxisAttr("X")
+    if limits:
+        joint.CreateLowerLimitAttr(float(np.degrees(limits[0])))
+        joint.CreateUpperLimitAttr(float(np.degrees(limits[1])))
+    _drive(joint.GetPrim(), "angular", gains, angle)
+
+
+def _d6(stage, path, ends, frame0, frame1, reach, gains, euler) -> None:
+    prim = _joint(stage, UsdPhysics.Joint, path, ends, frame0, frame1).GetPrim()
+    for k, axis in enumerate(AXES):
+        lock = UsdPhysics.LimitAPI.Apply(prim, f"trans{axis}")
+        lock.CreateLowAttr(1.0)
+        lock.CreateHighAttr(-1.0)
+        if reach:
+            limit = UsdPhysics.LimitAPI.Apply(prim, f"rot{axis}")
+            limit.CreateLowAttr(float(-np.degrees(reach)))
+            limit.CreateHighAttr(float(np.degrees(reach)))
+        _drive(prim, f"rot{axis}", gains, euler[k])
+
+
+def _drive(prim, where: str, gains, angle: float) -> None:
+    """A force drive to `angle` [rad]; gains: kp [N m/rad], kd [N m s/rad], effort [N m]."""
+    if gains is None:
+        return
+    drive = UsdPhysics.DriveAPI.Apply(prim, where)
+    drive.CreateTypeAttr("force")
+    drive.CreateStiffnessAttr(gains[0] * PER_DEGREE)
+    drive.CreateDampingAttr(gains[1] * PER_DEGREE)
+    drive.CreateMaxForceAttr(gains[2])
+    drive.CreateTargetPositionAttr(float(np.degrees(angle)))
+    drive.CreateTargetVelocityAttr(0.0)
+
+
+def _extend(prim, armature: float, angle: float | None = None) -> None:
+    """What the schema has no word for, in the words of engines: armature [kg m^2], and for MuJoCo the angle
+    [rad] at which a hinge starts, without which it would count limits from there."""
+    said = {
+        "NewtonJointAPI": ("newton:armature", Sdf.ValueTypeNames.Float, armature),
+        "PhysxJointAPI": ("physxJoint:armature", Sdf.ValueTypeNames.Float, armature),
+    }
+    if angle is not None:
+        said["MjcJointAPI"] = ("mjc:ref", Sdf.ValueTypeNames.Double, float(np.degrees(angle)))
+    for schema, (name, kind, value) in said.items():
+        prim.AddAppliedSchema(schema)
+        prim.CreateAttribute(name, kind, custom=False).Set(value)
+
+
+def _bone_axis(model, link: int) -> str:
+    """The axis of a link's frame that its bone runs along: towards the links it carries, or its own mass."""
+    t = model.tables
+    carried = [t["link_offset"][i] for i in range(1, len(t["link_parent"])) if t["link_parent"][i] == link]
+    along = np.sum(carried, axis=0) if carried else t["link_com"][link]
+    return AXES[int(np.argmax(np.abs(along)))]
+
+
+def _quatf(turn: Rotation) -> Gf.Quatf:
+    x, y, z, w = turn.as_quat().tolist()
+    return Gf.Quatf(w, x, y, z)
