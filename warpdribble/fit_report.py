@@ -74,13 +74,15 @@ def _fit_lines(rows: list[dict]) -> list[str]:
         worst = max(rows, key=lambda row: row[key])
         late = sum(row[key] >= GOALS[key] for row in rows)
         lines.append(f"| {what} | {late} of {len(rows)} | {worst[key]:.1f} ({worst['clip']}) |")
-    heads = ["clip", "scale", "copied only", "with IK", *limbs, "slide", "99 %", "slide, all points", "deepest", "stands"]
+    heads = ["clip", "scale", "copied only", "with IK", *limbs]
+    heads += ["slide", "99 %", "slide, all points", "deepest", "stands"]
     lines += ["", f"| {' | '.join(heads)} |"]
     lines.append("|---|" + "---:|" * (len(limbs) + 8))
     for row in rows:
         cells = [row["clip"], f"{row['scale']:.3f}", f"{row['copied']:.1f}", _cell(row, "mean")]
         cells += [_cell(row, limb) for limb in limbs]
-        cells += [_cell(row, "slide"), f"{row['slide99']:.0f}", _cell(row, "slide all"), _cell(row, "deep"), f"{row['stands']:.0f}"]
+        cells += [_cell(row, "slide"), f"{row['slide99']:.0f}", _cell(row, "slide all")]
+        cells += [_cell(row, "deep"), f"{row['stands']:.0f}"]
         lines.append(f"| {' | '.join(cells)} |")
     lines += ["", "Errors in cm, slide in mm/s, deepest point under the ground in mm, stands in % of frames."]
     return lines
