@@ -10,6 +10,7 @@ import warp as wp
 
 from .bounce import BOUNCE_SPEED, bounce
 from .collide import Touch, probe
+from .kinematics import joint_dofs
 from .rows import rows_change, rows_velocity
 from .spatial import *
 from .tree import BALL, FREE, HINGE, Tree, World
@@ -114,16 +115,6 @@ def pass_joint(tree: Tree, world: World, g: int, i: int, F: Wrenches, at: int) -
             world.y[g, at + 3 + k] = y
             F = pass_dof(F, world.U[g, dof], y)
     return F
-
-
-@wp.func
-def joint_dofs(tree: Tree, i: int) -> int:
-    joint = tree.link_joint[i]
-    if joint == HINGE:
-        return 1
-    if joint == BALL:
-        return 3
-    return 6
 
 
 @wp.func

@@ -3,7 +3,7 @@
 import warp as wp
 
 from .spatial import *
-from .tree import BALL, FREE, GROUND, Tree, World
+from .tree import BALL, FREE, GROUND, HINGE, Tree, World
 
 
 @wp.func
@@ -21,6 +21,16 @@ def store3(a: wp.array2d(dtype=Real), g: int, i: int, v: Vec3):
     a[g, i] = v.x
     a[g, i + 1] = v.y
     a[g, i + 2] = v.z
+
+
+@wp.func
+def joint_dofs(tree: Tree, i: int) -> int:
+    joint = tree.link_joint[i]
+    if joint == HINGE:
+        return 1
+    if joint == BALL:
+        return 3
+    return 6
 
 
 @wp.func

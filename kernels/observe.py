@@ -7,7 +7,7 @@ whatever a step has left behind.
 import warp as wp
 
 from .collide import probe
-from .kinematics import inertias, kinematics
+from .kinematics import inertias, joint_dofs, kinematics
 from .spatial import *
 from .tree import BALL, GROUND, HINGE, Tree, World
 
@@ -78,16 +78,6 @@ def axis(tree: Tree, world: World, g: int, i: int, k: int) -> Motion:
     return Motion(column(R, k - 3), zero)
 
 
-@wp.func
-def dofs(tree: Tree, i: int) -> int:
-    joint = tree.link_joint[i]
-    if joint == HINGE:
-        return 1
-    if joint == BALL:
-        return 3
-    return 6
-
-
 @wp.kernel
 def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real)):
     """Joint-space inertia with armature, dof_count^2 numbers a world, by composite rigid bodies
@@ -104,12 +94,12 @@ def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real))
         I = world.I[g, i]
         if parent != GROUND:
             world.I[g, parent] = world.I[g, parent] + shift_inertia(I, world.r[g, i])
-        for k in range(dofs(tree, i)):
+        for k in range(joint_dofs(tree, i)):
             j = tree.link_dof[i] + k
             F = I * axis(tree, world, g, i, k)
             a = int(i)
             while a != GROUND:
-                for m in range(dofs(tree, a)):
+                for m in range(joint_dofs(tree, a)):
                     other = tree.link_dof[a] + m
                     value = dot(axis(tree, world, g, a, m), F)
                     if other <= j:
@@ -130,7 +120,7 @@ def bias_force(tree: Tree, world: World, first: int, C: wp.array2d(dtype=Real)):
     for c in range(tree.link_count):
         i = tree.link_count - c
         p = world.p[g, i]
-        for k in range(dofs(tree, i)):
+        for k in range(joint_dofs(tree, i)):
             C[g, tree.link_dof[i] + k] = dot(axis(tree, world, g, i, k), p)
         parent = tree.link_parent[i]
         if parent != GROUND:

@@ -187,7 +187,8 @@ class Simulation(Batch):
         """The state as torch tensors, without a copy where the layout allows"""
         return Tensors(self)
 
-    def _bodies(self) -> tuple[np.ndarray, np.ndarray]:
+    def bodies(self) -> tuple[np.ndarray, np.ndarray]:
+        """`body_q` and `body_qd`, in one go"""
         n = self.model.nbody
         pose = self._allocate(7 * n, self._program.Real)
         velocity = self._allocate(6 * n, self._program.Real)
@@ -198,13 +199,13 @@ class Simulation(Batch):
     @property
     def body_q(self) -> np.ndarray:
         """(world_count, nbody, 7): position [m] and quaternion xyzw of each body's frame"""
-        return self._bodies()[0]
+        return self.bodies()[0]
 
     @property
     def body_qd(self) -> np.ndarray:
         """(world_count, nbody, 6): velocity of each body's centre of mass [m/s], angular velocity [rad/s],
         along the world's axes"""
-        return self._bodies()[1]
+        return self.bodies()[1]
 
     @property
     def status(self) -> np.ndarray:
