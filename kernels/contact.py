@@ -13,7 +13,7 @@ from .collide import Touch, probe
 from .kinematics import joint_dofs
 from .rows import rows_change, rows_velocity
 from .spatial import *
-from .tree import BALL, FREE, HINGE, Tree, World
+from .tree import FREE, HINGE, Tree, World
 
 NEVER = wp.constant(-1.0e9)
 """Normal velocity [m/s] that every slot exceeds: the goal of a lane that does not touch."""
