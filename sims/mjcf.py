@@ -92,6 +92,7 @@ def compile_mjcf(path: str | Path, rigid: tuple[str, ...] = (), pose: str = "sta
     if not path.is_file():
         raise ModelError(f"{path}: no such file; give the path of an MJCF file, or 'player'")
     try:
+        path.read_text(encoding="utf-8")  # MuJoCo takes other bytes as names, and cannot say them
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
         keys = {model.key(k).name: _by_joint(model, model.key_qpos[k]) for k in range(model.nkey)}
