@@ -13,6 +13,8 @@ from typing import Literal
 import numpy as np
 import tyro
 
+from ..commands.console import quiet_warp
+from ..sims import Simulation
 from ..sims.simulation import SWEEPS
 from .mjwarp import MuJoCoWarp
 from .mujoco import SETTINGS, MuJoCo
@@ -83,9 +85,7 @@ def processor() -> str:
 
 
 def step(options: Step) -> Result:
-    import warp
-
-    warp.config.log_level = warp.LOG_ERROR
+    quiet_warp()
     scene = hold(max(options.worlds), options.rounds)
     start = time.perf_counter()
     sides = [
@@ -131,11 +131,7 @@ def step(options: Step) -> Result:
 
 
 def solve(options: Solve) -> list[dict]:
-    import warp
-
-    from ..sims import Simulation
-
-    warp.config.log_level = warp.LOG_ERROR
+    quiet_warp()
     scene = hold(options.worlds, 40)
     rows = []
     for sweeps in options.sweeps:

@@ -185,6 +185,12 @@ def factorize(tree: Tree, world: World, g: int):
 
 
 @wp.func
+def rate(world: World, g: int, j: int, V: Motion) -> Real:
+    """Velocity of dof j, V being what the dofs before it give its link: its row of qd = L^-1 D^(-1/2) w."""
+    return world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+
+
+@wp.func
 def velocities(tree: Tree, world: World, g: int):
     """Root to leaves: qd = L^-1 D^(-1/2) w, and V. Joints turn no faster than tree.max_speed."""
     fast = world.hurried[g, 0]
@@ -195,7 +201,7 @@ def velocities(tree: Tree, world: World, g: int):
         j = tree.link_dof[i]
         V = shift_motion(world.V[g, tree.link_parent[i]], world.r[g, i])
         if joint == HINGE:
-            v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+            v = rate(world, g, j, V)
             fast = where_lt(top, size(v), one, fast)
             v = most(neg(top), least(top, v))
             world.qd[g, j] = v
@@ -203,13 +209,13 @@ def velocities(tree: Tree, world: World, g: int):
         else:
             if joint == FREE:
                 for k in range(3):
-                    v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+                    v = rate(world, g, j, V)
                     world.qd[g, j] = v
                     V.v = V.v + v * world.s[g, j]
                     j = j + 1
             before = V.w
             for k in range(3):
-                v = world.d[g, j + k] * (world.w[g, j + k] - dot(V, world.U[g, j + k]))
+                v = rate(world, g, j + k, V)
                 V.w = V.w + v * world.s[g, j + k]
             turn_rate = V.w - before
             speed = norm(turn_rate)
@@ -232,7 +238,7 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
         above = world.p[g, tree.link_parent[i]]
         V = shift_motion(Motion(above.n, above.f), world.r[g, i])
         if joint == HINGE:
-            v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+            v = rate(world, g, j, V)
             V.w = V.w + v * world.s[g, j]
             if tree.link_driven[i] != 0:
                 end = Vec3(v, fill(0.0), fill(0.0))
@@ -240,12 +246,12 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
         else:
             if joint == FREE:
                 for k in range(3):
-                    v = world.d[g, j] * (world.w[g, j] - dot(V, world.U[g, j]))
+                    v = rate(world, g, j, V)
                     V.v = V.v + v * world.s[g, j]
                     j = j + 1
             before = V.w
             for k in range(3):
-                v = world.d[g, j + k] * (world.w[g, j + k] - dot(V, world.U[g, j + k]))
+                v = rate(world, g, j + k, V)
                 V.w = V.w + v * world.s[g, j + k]
             if tree.link_driven[i] != 0:
                 end = mul_t(world.R[g, i], V.w - before)

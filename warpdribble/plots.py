@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from .sheet import INK, RIGHT_COLOUR
-from .take import TakeError, check_writable, written_whole
+from .sheet import INK, RIGHT_COLOUR, save
+from .take import check_writable
 
 REFERENCE_COLOUR = "#b0b7bf"
 FALL_COLOUR = "#c0392b"
@@ -39,13 +39,7 @@ def write_plots(
     _draw_error(lower, times, 100.0 * position_error, "bodies off [cm]", fallen)
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time [s]", color=INK)
-    figure.suptitle(title, fontsize=12, color=INK, x=0.01, ha="left")
-    try:
-        with written_whole(path) as part:
-            figure.savefig(part)
-    except OSError as error:
-        raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
-    return path
+    return save(figure, title, path)
 
 
 def _draw_path(axes, root, wanted) -> None:

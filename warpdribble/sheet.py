@@ -46,6 +46,11 @@ def write_sheet(
     _draw_heights(heights, take, hands, times, frames)
     _draw_strips(strips, contacts, times)
     heights.sharex(strips)
+    return save(figure, title, path)
+
+
+def save(figure: Figure, title: str, path: Path) -> Path:
+    """Write a figure under its title; the file appears whole or not at all. Raises TakeError."""
     figure.suptitle(title, fontsize=12, color=INK, x=0.01, ha="left")
     try:
         with written_whole(path) as part:
