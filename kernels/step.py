@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from .aim import Course, aim
 from .articulated import factorize, judge_drives, velocities
 from .contact import HEAD, find, residual, solve  # noqa: F401
 from .drive import LAST_TRIAL
@@ -45,9 +46,11 @@ def advance(tree: Tree, world: World, g: int):
 
 
 @wp.kernel
-def step(tree: Tree, world: World, first: int, count: int):
+def step(tree: Tree, world: World, first: int, count: int, course: Course):
     g = first + wp.tid()
-    for _k in range(count):
+    for k in range(count):
+        if course.table.shape[0] > 0:
+            aim(tree, world, course, g, k)
         advance(tree, world, g)
 
 

@@ -17,6 +17,10 @@ RESPONSE_ROOM = 1365
 """Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
 
 
+CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
+"""State that a step hands to the next."""
+
+
 def widest_lanes() -> int:
     """Worlds that one vector register of this processor holds."""
     machine = platform.machine().lower()
@@ -62,6 +66,7 @@ class Batch:
         self._side_by_side = not on_cpu
         self._program = kernels.program(self.lanes)
         self._observer = kernels.program(self.lanes, "observe")
+        self._exchange = kernels.program(self.lanes, "exchange")
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
@@ -108,9 +113,31 @@ class Batch:
             "active": 2 * tree.slot_count + 2,
         }
         world = program.World()
-        for name, var in program.World.vars.items():
-            setattr(world, name, self._allocate(counts[name], var.type.dtype))
+        types = {name: var.type.dtype for name, var in program.World.vars.items()}
+        for name in types.keys() - set(CARRIED):
+            setattr(world, name, self._allocate(counts[name], types[name]))
+        self._lay_out(world, {name: (counts[name], types[name]) for name in CARRIED})
         return world
+
+    def _lay_out(self, world, arrays: dict) -> None:
+        """Arrays, `(count, type)` by name, one after the other in `_carried`, so that a world's state moves
+        in one go."""
+        lanes, groups = self.lanes, self.groups
+        blocks, start = [], 0
+        for count, dtype in arrays.values():
+            count = max(count, 1)
+            parts = wp.types.type_size_in_bytes(dtype) // (4 * lanes)
+            strides = (parts, groups * parts) if self._side_by_side else (count * parts * lanes, parts * lanes)
+            blocks.append((start, count, parts, *strides))
+            start += groups * count * parts * lanes
+        self._carried = wp.zeros(start, dtype=float, device=self.device)
+        for (name, (_, dtype)), (start, count, *_) in zip(arrays.items(), blocks):
+            shape = (count, groups) if self._side_by_side else (groups, count)
+            array = wp.array(ptr=self._carried.ptr + 4 * start, dtype=dtype, shape=shape, device=self.device)
+            setattr(world, name, array.transpose() if self._side_by_side else array)
+        block = self._exchange.Block
+        table = np.array(blocks, np.int32).view(block.numpy_dtype()).ravel()
+        self._blocks = wp.array(table, dtype=block, device=self.device)
 
     def _allocate(self, count: int, dtype) -> wp.array:
         """Zeros `(groups, count)`."""
@@ -168,6 +195,16 @@ class Batch:
             structured = hasattr(array.dtype, "numpy_dtype")
             dtype = array.dtype.numpy_dtype() if structured else np.float32
             array.assign(rows.reshape(-1).view(dtype).reshape(array.shape))
+
+    def _fill(self, array: wp.array, values: np.ndarray) -> None:
+        """Set an array `(groups, n)` of Reals from `values` (world_count, n)."""
+        spare = self.groups * self.lanes - self.world_count
+        values = np.pad(np.asarray(values, np.float32), ((0, spare), (0, 0)), mode="edge")
+        values = values.reshape(self.groups, self.lanes, -1).transpose(0, 2, 1)
+        if self._side_by_side:
+            array.assign(np.ascontiguousarray(values[..., 0]))
+        else:
+            self._rows(array)[:, :, 0] = values
 
     def _worlds(self, worlds) -> np.ndarray:
         if worlds is None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
-from .batch import Batch
+from .batch import CARRIED, Batch
 from .model import Model
 from .tensors import Tensors, as_array
 
@@ -15,9 +16,6 @@ SWEEPS = 10
 
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
-
-CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
-"""State that a step hands to the next."""
 
 NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
 """Bits of `Simulation.status`."""
@@ -114,10 +112,21 @@ class Simulation(Batch):
         sources = self._worlds(sources)
         if sources.shape != (self.world_count,):
             raise ValueError(f"sources must have shape ({self.world_count},), not {sources.shape}")
-        everyone = np.arange(self.world_count)
-        for name in CARRIED:
-            array = getattr(self._world, name)
-            self._write(name, everyone, self._read(array)[sources].reshape(self.world_count, -1))
+        spare = self.groups * self.lanes - self.world_count
+        padded = np.pad(sources, (0, spare), mode="edge").reshape(self.groups, self.lanes)
+        moves = wp.array(padded, dtype=int, device=self.device)
+        state = self._carried
+        if (sources[sources] != sources).any():  # a world that is copied from changes, too
+            state = self.snapshot()
+        self._run(self._exchange, "gather", [moves, self._blocks, state, self._carried])
+
+    def snapshot(self) -> wp.array:
+        """The state of all worlds, contact history and status included, for `restore`."""
+        return wp.clone(self._carried)
+
+    def restore(self, snapshot: wp.array) -> None:
+        """Put all worlds into the state of a `snapshot` of this simulation."""
+        wp.copy(self._carried, snapshot)
 
     def set_targets(self, joint_target_q) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
@@ -168,7 +177,7 @@ class Simulation(Batch):
 
     def step(self, count: int = 1) -> None:
         """Advance all worlds by `count` steps of `model.timestep`."""
-        self.launch("step", count)
+        self._run(self._program, "step", [count, self._program.Course()])
 
     # ------------------------------------------------------------------------------- observations
 
