@@ -9,13 +9,13 @@ import warp as wp
 from .aim import choose
 from .kinematics import kinematics, load3, load4, store3
 from .spatial import *
-from .tree import BALL, HINGE, Tree, World
+from .tree import HINGE, Tree, World
 
 wp.set_module_options(
     {"enable_backward": False, "max_unroll": 3, "cpu_compiler_flags": "-march=native -ffp-contract=fast"}
 )
 
-WHOLE = wp.constant(16)
+WHOLE = wp.constant(17)
 """Columns of `sense` that are not an end's."""
 
 
@@ -32,8 +32,6 @@ class Character:
     """links whose mass is its own"""
     judged: wp.array(dtype=int)
     """links whose joints are compared"""
-    rate_weight: float
-    """of a joint's rate beside its angle [s]"""
     end_link: wp.array(dtype=int)
     end_point: wp.array(dtype=wp.vec3)
     """place on the link [m]"""
@@ -59,6 +57,16 @@ def momentum(tree: Tree, world: World, g: int, i: int) -> Force:
     return rigid(R, k * tree.link_mass[i], rotate(R, tree.link_com[i]), moments) * world.V[g, i]
 
 
+@wp.struct
+class Miss:
+    """How far a joint is from its goal."""
+
+    angle: Real
+    """[rad]"""
+    rate: Real
+    """[rad/s]"""
+
+
 @wp.func
 def miss(
     tree: Tree,
@@ -68,20 +76,23 @@ def miss(
     q: wp.array2d(dtype=float),
     qd: wp.array2d(dtype=float),
     rows: wp.array2d(dtype=int),
-    rate_weight: float,
-) -> Real:
-    """Angle from a joint to its goal, and the difference of their rates."""
+) -> Miss:
     iq = tree.link_q[i]
     iv = tree.link_dof[i]
     if tree.link_joint[i] == HINGE:
-        angle = world.q[g, iq] - choose(q, rows, g, 0, iq)
-        return size(angle) + rate_weight * size(world.qd[g, iv] - choose(qd, rows, g, 0, iv))
+        return Miss(
+            size(world.q[g, iq] - choose(q, rows, g, 0, iq)), size(world.qd[g, iv] - choose(qd, rows, g, 0, iv))
+        )
     goal = Quat(
-        choose(q, rows, g, 0, iq), choose(q, rows, g, 0, iq + 1), choose(q, rows, g, 0, iq + 2), choose(q, rows, g, 0, iq + 3)
+        choose(q, rows, g, 0, iq),
+        choose(q, rows, g, 0, iq + 1),
+        choose(q, rows, g, 0, iq + 2),
+        choose(q, rows, g, 0, iq + 3),
     )
     rate = Vec3(choose(qd, rows, g, 0, iv), choose(qd, rows, g, 0, iv + 1), choose(qd, rows, g, 0, iv + 2))
-    angle = norm(logarithm(conjugate(goal) * load4(world.q, g, iq)))
-    return angle + rate_weight * norm(load3(world.qd, g, iv) - rate)
+    return Miss(
+        norm(logarithm(conjugate(goal) * load4(world.q, g, iq))), norm(load3(world.qd, g, iv) - rate)
+    )
 
 
 @wp.kernel
@@ -97,9 +108,9 @@ def sense(
 ):
     """out, WHOLE + 3 ends numbers: 0 lean of the root (x and y of its third axis), 2 its height [m], 3
     centre of mass [m], 6 its velocity [m/s], 9 angular momentum about it [kg m^2/s], 12 angular
-    velocity of the root [rad/s], 15 mean over the judged joints of the `miss` from the goals q, qd
-    (tables, of which each world has a row) [rad]; then each end's place [m]. Places count from the
-    ground below the root."""
+    velocity of the root [rad/s], 15 mean angle [rad] and 16 mean rate [rad/s] between the judged joints
+    and the goals q, qd (tables, of which each world has a row); then each end's place [m]. Places
+    count from the ground below the root."""
     g = first + wp.tid()
     kinematics(tree, world, g)
     R = world.R[g, who.root]
@@ -127,10 +138,15 @@ def sense(
     store3(out, g, 6, (1.0 / mass) * facing(R, P))
     store3(out, g, 9, facing(R, L - cross(com, P)))
     store3(out, g, 12, facing(R, world.V[g, who.root].w))
-    total = fill(0.0)
+    angle = fill(0.0)
+    rate = fill(0.0)
     for k in range(who.judged.shape[0]):
-        total = total + miss(tree, world, g, who.judged[k], q, qd, rows, who.rate_weight)
-    out[g, 15] = (1.0 / wp.max(float(who.judged.shape[0]), 1.0)) * total
+        off = miss(tree, world, g, who.judged[k], q, qd, rows)
+        angle = angle + off.angle
+        rate = rate + off.rate
+    share = 1.0 / wp.max(float(who.judged.shape[0]), 1.0)
+    out[g, 15] = share * angle
+    out[g, 16] = share * rate
     for k in range(who.end_link.shape[0]):
         i = who.end_link[k]
         r = world.pos[g, i] + rotate(world.R[g, i], who.end_point[k]) - at

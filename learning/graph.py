@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
@@ -10,80 +11,114 @@ from ..sims.feedforward import leading_targets
 from ..sims.reference import Cycle, Reference, resample_q
 
 STEPS = 5
-"""Time steps of a control fragment, 0.05 s (P1 3.2)."""
+"""Time steps of a control fragment: 0.05 s (P1 3.2)."""
+SHORTEST = 4
+"""Fragments of a cycle that can be learned."""
 
 
 @dataclass(frozen=True)
 class ControlGraph:
-    """Control fragments C_k = (m_k, pi_k), the motion halves m_k; the policies are learned.
+    """The motion halves m_k of control fragments C_k = (m_k, pi_k); `samcon` learns the policies pi_k.
 
-    The motion of fragment k are the rows k STEPS ... k STEPS + STEPS - 1 of `targets`.
+    Fragment k has the rows k STEPS ... (k + 1) STEPS - 1 of `targets`.
     """
 
     targets: np.ndarray
     """(fragments * STEPS, nq) open-loop targets of the drives, a row per time step"""
     start_q: np.ndarray
-    """(fragments, nq) reference pose at the start of each fragment"""
+    """(fragments, nq) where the reference begins each fragment"""
     start_qd: np.ndarray
     """(fragments, nv)"""
     goal_q: np.ndarray
-    """(fragments, nq) reference pose at the end"""
+    """(fragments, nq) where it ends each"""
     goal_qd: np.ndarray
-    successors: tuple[tuple[int, ...], ...]
-    """fragments that may follow each one"""
+    edges: np.ndarray
+    """(edges, 2) fragments, of which the second may follow the first"""
     timestep: float
     """[s]"""
     stretch: float = 1.0
-    """by which the motion's time was stretched for whole fragments"""
+    """Its time was stretched by this factor, for whole fragments."""
+
+    def __post_init__(self):
+        edges = np.asarray(self.edges, int).reshape(-1, 2)
+        if edges.size and not (0 <= edges.min() and edges.max() < self.count):
+            raise ValueError(f"edges lead outside the {self.count} fragments of the graph")
+        ends = np.setdiff1d(np.arange(self.count), edges[:, 0])
+        if len(ends):
+            raise ValueError(f"no fragment follows fragment {ends[0]}: a random walk would end there")
+        after = [edges[edges[:, 0] == k, 1] for k in range(self.count)]
+        object.__setattr__(self, "edges", edges)
+        object.__setattr__(self, "_after", after)
 
     @property
     def count(self) -> int:
+        """Fragments."""
         return len(self.start_q)
 
-    def follow(self, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """A random successor (n,) of each fragment."""
-        counts = self._counts[k]
-        return self._table[k, (random.random(len(k)) * counts).astype(int)]
+    @property
+    def period(self) -> float:
+        """[s] of a fragment"""
+        return STEPS * self.timestep
 
-    def __post_init__(self):
-        counts = np.array([len(s) for s in self.successors])
-        if len(counts) != self.count or (counts == 0).any():
-            raise ValueError("every fragment of a control graph needs a successor")
-        table = np.zeros((self.count, counts.max()), int)
-        for k, after in enumerate(self.successors):
-            table[k, : len(after)] = after
-        object.__setattr__(self, "_counts", counts)
-        object.__setattr__(self, "_table", table)
+    def follow(self, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
+        """For each fragment k (n,) one that follows it, drawn evenly (n,)."""
+        draw = random.random(len(k))
+        return np.array([self._after[i][int(u * len(self._after[i]))] for i, u in zip(k, draw)])
+
+    def save(self, path: str | Path) -> None:
+        """Write an .npz file."""
+        np.savez_compressed(path, **{f.name: getattr(self, f.name) for f in fields(self)})
+
+    @staticmethod
+    def load(path: str | Path) -> ControlGraph:
+        """Read what `save` wrote."""
+        with np.load(path) as file:
+            values = {f.name: file[f.name] for f in fields(ControlGraph)}
+        values |= {name: float(values[name]) for name in ("timestep", "stretch")}
+        return ControlGraph(**values)
 
 
 def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph:
-    """The smallest graph: a cycle whose last fragment leads to the first. Its time is stretched to a whole
-    number of fragments. Raises ValueError for a cycle shorter than two fragments."""
-    reference = cycle.reference
-    rows = reference.frame_count - 1
+    """The smallest graph, a cycle whose last fragment leads to the first.
+
+    The cycle's time is stretched to whole fragments. feet: bodies that carry it; see `leading_targets`.
+    Raises ValueError for a cycle too short to be cut.
+    """
+    rows = cycle.reference.frame_count - 1
     count = round(rows / STEPS)
-    if count < 2:
-        raise ValueError(f"a cycle of {reference.duration:.2f} s is too short to be learned")
+    if count < SHORTEST:
+        raise ValueError(f"a cycle of {cycle.reference.duration:.2f} s is too short: give 0.2 s or more")
     at = np.linspace(0.0, rows, count * STEPS + 1)
-    fitted = Cycle(
-        Reference(resample_q(model, reference.joint_q, at), reference.timestep), cycle.turn, cycle.travel
-    )
-    several = fitted.repeat(model, 3)
-    middle = slice(count * STEPS, 2 * count * STEPS)
-    targets = leading_targets(model, several, feet)[middle.start + 1 : middle.stop + 1]
+    fitted = Reference(resample_q(model, cycle.reference.joint_q, at), cycle.reference.timestep)
+    several = Cycle(fitted, cycle.turn, cycle.travel).repeat(model, 3)
     speed = _central_velocity(model, several)
-    q, qd = several.joint_q[middle], speed[middle]
-    first = np.arange(count) * STEPS
-    later = (first + STEPS) % (count * STEPS)
+    first = np.arange(count + 1) * STEPS + count * STEPS  # of the middle cycle, and of the one after
+    begins, ends = first[:-1], first[1:]
+    targets = leading_targets(model, several, feet)
     return ControlGraph(
-        targets=targets,
-        start_q=q[first],
-        start_qd=qd[first],
-        goal_q=q[later],
-        goal_qd=qd[later],
-        successors=tuple(((k + 1) % count,) for k in range(count)),
-        timestep=reference.timestep,
+        targets=targets[begins[0] + 1 : ends[-1] + 1],
+        start_q=several.joint_q[begins],
+        start_qd=speed[begins],
+        goal_q=several.joint_q[ends],
+        goal_qd=speed[ends],
+        edges=np.stack([np.arange(count), (np.arange(count) + 1) % count], axis=1),
+        timestep=fitted.timestep,
         stretch=count * STEPS / rows,
+    )
+
+
+def joined(graphs: list[ControlGraph], transitions) -> ControlGraph:
+    """Several graphs as one. transitions: ((graph, fragment), (graph, fragment)) pairs, of which the second
+    may follow the first; nothing is blended, so they should lead between similar states."""
+    first = np.concatenate([[0], np.cumsum([g.count for g in graphs])[:-1]])
+    between = [[first[a] + i, first[b] + j] for (a, i), (b, j) in transitions]
+    edges = [g.edges + start for g, start in zip(graphs, first)]
+    arrays = ("targets", "start_q", "start_qd", "goal_q", "goal_qd")
+    return ControlGraph(
+        **{name: np.concatenate([getattr(g, name) for g in graphs]) for name in arrays},
+        edges=np.concatenate([*edges, np.array(between, int).reshape(-1, 2)]),
+        timestep=graphs[0].timestep,
+        stretch=float(np.mean([g.stretch for g in graphs])),
     )
 
 

@@ -1,105 +1,161 @@
-"""Locomotion as a control problem: what a policy feels, what it changes, and what that costs."""
+"""Locomotion as a control problem: what a policy feels, what it changes, and what that costs (P1 3.3, with
+the state and the cost of Liu et al. 2016)."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..sims import Model, Simulation
 from ..sims.character import (
+    ANGLE,
     ANGULAR_MOMENTUM,
     COM,
     COM_VELOCITY,
+    ENDS,
     HEIGHT,
     LEAN,
-    MISS,
+    RATE,
     SPIN,
-    WHOLE,
     Character,
 )
 from ..sims.simulation import FALL, NONFINITE
+from .disturbance import HANDS, PUSHED
 from .graph import STEPS, ControlGraph
 
-RIGID = ("*_mcp", "*_pip", "*_dip")
+FINGERS = ("*_mcp", "*_pip", "*_dip")
 STEERED = ("lower_back", "l_hip", "r_hip", "l_knee", "r_knee")
+"""Joints that a policy offsets: 11 numbers."""
 ARMS = ("l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist")
-LEGS_AND_TRUNK = (
-    "lower_back", "torso", "neck",
-    "l_hip", "l_knee", "l_ankle", "l_toes", "r_hip", "r_knee", "r_ankle", "r_toes",
-)  # fmt: skip
-ENDS = ("l_foot", "r_foot", "head")
-AWAY = (30.0, 30.0)
-SCALE = np.array([0.1, 0.1, 0.05] + [0.05] * 3 + [0.3] * 3 + [3.0] * 3 + [0.05] * 6)
+LEGS = ("l_hip", "l_knee", "l_ankle", "l_toes", "r_hip", "r_knee", "r_ankle", "r_toes")
+JUDGED = ("lower_back", "torso", "neck", *LEGS)
+"""Joints in the pose cost; the arms belong to another policy."""
+FELT = ("l_foot", "r_foot", "head")
+"""Ends: the feet are in the state, all are in the cost."""
+STATE = (
+    (LEAN, 0.1),
+    (HEIGHT, 0.05),
+    (COM, 0.05),
+    (COM_VELOCITY, 0.3),
+    (ANGULAR_MOMENTUM, 3.0),
+    (slice(ENDS, ENDS + 6), 0.05),
+)
+"""Parts of the 18-number reduced state, and the deviation that counts as one."""
 FALLEN = 0.3
-"""[m] a root this far below the reference's has fallen"""
+"""[m] A root this far below the reference's has fallen."""
+HEIGHT_UNIT = 1.6
+"""[m] of the balance cost"""
 
 
-def player() -> Model:
-    return Model.load("player", rigid=RIGID)
+@dataclass(frozen=True)
+class CostWeights:
+    """Weights of the cost's terms."""
+
+    pose: float = 5.0
+    """of the mean over the joints of angle [rad] + 0.1 rate [rad/s]"""
+    root: float = 3.0
+    """of the root's lean [-] + 0.1 angular velocity [rad/s]"""
+    ends: float = 30.0
+    """of the mean height of feet and head [m]"""
+    balance: float = 10.0
+    """of the centre of mass over feet and head [1.6 m] + 0.1 its velocity [m/s]"""
+
+
+def locomotion_model() -> Model:
+    """The player with stiff hands and without the ball: 45 + 6 degrees of freedom (P1 3.3)."""
+    return Model.load("player", rigid=FINGERS, without=("ball",))
 
 
 class Locomotion:
-    """Worlds in which the player follows a control graph."""
+    """Worlds in which the player follows a control graph, each from fragment to fragment on its own."""
 
-    def __init__(self, model: Model, graph: ControlGraph, world_count: int, device="cpu", threads=None):
-        self.model, self.graph = model, graph
+    def __init__(
+        self,
+        model: Model,
+        graph: ControlGraph,
+        world_count: int,
+        device: str = "cpu",
+        threads: int | None = None,
+        weights: CostWeights = CostWeights(),
+    ):
+        self.model, self.graph, self.weights = model, graph, weights
         self.sim = Simulation(model, world_count, device, threads)
         self.character = Character(
-            self.sim, graph.targets, graph.goal_q, graph.goal_qd, ENDS, LEGS_AND_TRUNK, STEERED + ARMS
+            self.sim, graph.targets, graph.goal_q, graph.goal_qd, FELT, JUDGED, STEERED + ARMS
         )
-        self.actions = sum(6 if False else model.dof_slice(n).stop - model.dof_slice(n).start for n in STEERED)
-        self.size = len(SCALE)
-        self.start, self.goal = self._features(graph.start_q, graph.start_qd), self._features(
-            graph.goal_q, graph.goal_qd
-        )
+        self.actions = sum(dof.stop - dof.start for dof in map(model.dof_slice, STEERED))
+        self.arm_columns = self.character.columns - self.actions
         self.offset = np.zeros((world_count, self.character.columns), np.float32)
+        self.scale = np.concatenate([np.full(part.stop - part.start, unit) for part, unit in STATE])
+        self.start = self._reference(graph.start_q, graph.start_qd)
+        self.goal = self._reference(graph.goal_q, graph.goal_qd)
+        self.samples = 0
+        self.simulating = 0.0
 
-    def parked(self, q):
-        q = np.array(q, float)
-        if "ball" in self.model.joint_names:
-            q[..., self.model.q_slice("ball")] = [*AWAY, 0.1193, 0.0, 0.0, 0.0, 1.0]
-        return q
+    @property
+    def states(self) -> int:
+        """Numbers of the reduced state."""
+        return len(self.scale)
 
-    def _features(self, q, qd):
-        out = []
-        n = self.sim.world_count
-        for first in range(0, len(q), n):
-            part = slice(first, first + n)
-            worlds = np.arange(len(q[part]))
-            self.sim.reset(worlds, joint_q=self.parked(q[part]), joint_qd=self.still(qd[part]))
-            out.append(self.character.sense(np.zeros(n, int))[worlds])
-        return np.concatenate(out)
+    def _reference(self, joint_q, joint_qd) -> np.ndarray:
+        """What the character feels in given states."""
+        count, felt = self.sim.world_count, []
+        for first in range(0, len(joint_q), count):
+            q, qd = (x[first : first + count] for x in (joint_q, joint_qd))
+            worlds = np.arange(len(q))
+            self.sim.reset(worlds, q, qd)
+            felt.append(self.character.sense(0)[worlds])
+        return np.concatenate(felt)
 
-    def still(self, qd):
-        qd = np.array(qd, float)
-        if "ball" in self.model.joint_names:
-            qd[..., self.model.dof_slice("ball")] = 0.0
-        return qd
-
-    def state(self, features, k):
-        """Reduced state s (n, 18), as deviation from the reference in units of SCALE."""
-        s = np.concatenate([features[:, 0:12], features[:, WHOLE : WHOLE + 6]], axis=1)
-        r = np.concatenate([self.start[k, 0:12], self.start[k, WHOLE : WHOLE + 6]], axis=1)
-        return (s - r) / SCALE
-
-    def advance(self, k, action):
-        """Simulate fragment k with the action; features at its end."""
-        self.offset[:, : self.actions] = action
-        self.character.step(STEPS, k * STEPS, self.offset)
+    def reset(self, k, joint_q, joint_qd) -> np.ndarray:
+        """Put every world into a state at the start of its fragment k (world_count,); what is felt there,
+        `Character.sense`."""
+        self.sim.reset(joint_q=joint_q, joint_qd=joint_qd)
         return self.character.sense(k)
 
-    def cost(self, f, k):
-        g = self.goal[k]
-        norm = np.linalg.norm
-        root = norm(f[:, LEAN] - g[:, LEAN], axis=1) + 0.1 * norm(f[:, SPIN] - g[:, SPIN], axis=1)
-        e, eg = (x[:, WHOLE:].reshape(len(x), -1, 3) for x in (f, g))
-        ends = np.abs(e[..., 2] - eg[..., 2]).mean(axis=1)
-        lever, wanted = (x[:, None, COM][..., :2] - y[..., :2] for x, y in ((f, e), (g, eg)))
-        balance = norm(lever - wanted, axis=2).mean(axis=1) / 1.6 + 0.1 * norm(f[:, COM_VELOCITY] - g[:, COM_VELOCITY], axis=1)
-        E = 5.0 * f[:, MISS] + 3.0 * root + 30.0 * ends + 10.0 * balance
-        return np.where(self.fallen(f, k), np.inf, E)
+    def calm(self) -> None:
+        """End all disturbances."""
+        self.offset[:, self.actions :] = 0.0
+        if self.sim.forced:
+            for body in (PUSHED, *HANDS):
+                self.sim.apply_force(body, np.zeros(3))
 
-    def fallen(self, f, k):
-        down = (self.sim.status & (FALL | NONFINITE)) > 0
-        return down | ~(f[:, 2] > self.goal[k, 2] - FALLEN)
+    def state(self, felt: np.ndarray, k) -> np.ndarray:
+        """Reduced state s (world_count, 18): the deviation from the reference at the start of fragments k."""
+        reference = self.start[k]
+        parts = [felt[:, part] - reference[:, part] for part, _ in STATE]
+        return np.concatenate(parts, axis=1) / self.scale
+
+    def advance(self, k, action) -> np.ndarray:
+        """Simulate fragments k (world_count,) under actions (world_count, actions) [rad]; what is felt at
+        their end."""
+        began = time.perf_counter()
+        self.offset[:, : self.actions] = action
+        self.character.step(STEPS, k * STEPS, self.offset)
+        self.simulating += time.perf_counter() - began
+        self.samples += len(self.offset)
+        return self.character.sense(k)
+
+    def cost(self, felt: np.ndarray, k) -> np.ndarray:
+        """E (world_count,) at the end of fragments k; infinite for who has fallen."""
+        w, goal = self.weights, self.goal[k]
+
+        def off(part) -> np.ndarray:
+            return np.linalg.norm(felt[:, part] - goal[:, part], axis=-1)
+
+        ends, wanted = (x[:, ENDS:].reshape(len(x), -1, 3) for x in (felt, goal))
+        height = np.abs(ends[..., 2] - wanted[..., 2]).mean(axis=1)
+        over = felt[:, None, COM] - ends - (goal[:, None, COM] - wanted)
+        over = np.linalg.norm(over[..., :2], axis=-1).mean(axis=1)
+        E = w.pose * (felt[:, ANGLE] + 0.1 * felt[:, RATE])
+        E = E + w.root * (off(LEAN) + 0.1 * off(SPIN))
+        E = E + w.ends * height
+        E = E + w.balance * (over / HEIGHT_UNIT + 0.1 * off(COM_VELOCITY))
+        return np.where(self.fallen(felt, k), np.inf, E)
+
+    def fallen(self, felt: np.ndarray, k) -> np.ndarray:
+        """Who (world_count,) lies on the ground, or about to."""
+        down = self.sim.status & (FALL | NONFINITE) != 0
+        return down | ~(felt[:, HEIGHT][:, 0] > self.goal[k, HEIGHT][:, 0] - FALLEN)

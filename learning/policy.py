@@ -1,3 +1,5 @@
+"""Stepwise linear feedback policies (P1 Eq. 4)."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -7,7 +9,8 @@ import numpy as np
 
 @dataclass
 class LinearPolicy:
-    """a = M_k s + a_hat_k, with exploration noise N(0, diag(sigma_k^2)) (P1 Eq. 4)."""
+    """pi_k(s) = M_k s + a_hat_k, evaluated once at the start of fragment k; samples of it are drawn from
+    N(pi_k(s), diag(sigma_k^2))."""
 
     M: np.ndarray
     """(fragments, actions, states)"""
@@ -17,15 +20,27 @@ class LinearPolicy:
     """(fragments, actions) [rad]"""
 
     @staticmethod
-    def zero(fragments, actions, states, sigma):
+    def zero(fragments: int, actions: int, states: int, sigma: float = 0.0) -> LinearPolicy:
+        """The open loop, as far as fragments go: no offset whatever the state."""
         return LinearPolicy(
-            np.zeros((fragments, actions, states)),
-            np.zeros((fragments, actions)),
-            np.full((fragments, actions), sigma),
+            M=np.zeros((fragments, actions, states)),
+            a_hat=np.zeros((fragments, actions)),
+            sigma=np.full((fragments, actions), float(sigma)),
         )
 
-    def act(self, s, k):
+    def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
+        """Actions (n, actions) [rad] for states s (n, states) at the start of fragments k (n,)."""
         return np.einsum("nij,nj->ni", self.M[k], s) + self.a_hat[k]
 
-    def copy(self):
+    def sample(self, s: np.ndarray, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
+        """Actions with exploration noise."""
+        return self.act(s, k) + self.sigma[k] * random.standard_normal((len(k), self.a_hat.shape[1]))
+
+    def copy(self) -> LinearPolicy:
         return LinearPolicy(self.M.copy(), self.a_hat.copy(), self.sigma.copy())
+
+    def moved(self, other: LinearPolicy, share: float) -> LinearPolicy:
+        """This policy, moved a share of the way to another."""
+        return LinearPolicy(
+            *((1.0 - share) * getattr(self, x) + share * getattr(other, x) for x in ("M", "a_hat", "sigma"))
+        )

@@ -12,9 +12,9 @@ from .. import kernels
 from . import gaps, pose
 from .reference import root_joint
 
-WHOLE = 16
-"""Columns of `Character.sense` before the ends' places."""
-LEAN, HEIGHT, COM, COM_VELOCITY, ANGULAR_MOMENTUM, SPIN, MISS = (
+ENDS = 17
+"""First column of `Character.sense` of the ends' places."""
+LEAN, HEIGHT, COM, COM_VELOCITY, ANGULAR_MOMENTUM, SPIN, ANGLE, RATE = (
     slice(0, 2),
     slice(2, 3),
     slice(3, 6),
@@ -22,10 +22,9 @@ LEAN, HEIGHT, COM, COM_VELOCITY, ANGULAR_MOMENTUM, SPIN, MISS = (
     slice(9, 12),
     slice(12, 15),
     15,
+    16,
 )
 """Columns of `Character.sense`."""
-RATE_WEIGHT = 0.1
-"""[s] of a joint's rate beside its angle, in `MISS`."""
 
 
 class Character:
@@ -33,7 +32,7 @@ class Character:
 
     targets, goal_q: (rows, nq) joint coordinates [m, rad, -], what the drives are given and where the
     joints should be; goal_qd: (rows, nv) [m/s, rad/s]. ends: bodies whose ends (the middle of the first
-    shape) are felt. judged: joints that count in `MISS`. steered: joints whose targets are offset, in
+    shape) are felt. judged: joints that count in ANGLE and RATE. steered: joints whose targets are offset, in
     the order of the offset's columns. Every world follows rows of its own.
     """
 
@@ -50,7 +49,7 @@ class Character:
             place = model.dof_slice(name)
             dofs[place] = self.columns + np.arange(place.stop - place.start)
             self.columns += place.stop - place.start
-        self._out = sim._allocate(WHOLE + 3 * len(self.ends), sim._program.Real)
+        self._out = sim._allocate(ENDS + 3 * len(self.ends), sim._program.Real)
         self._row = wp.zeros((sim.groups, sim.lanes), dtype=int, device=sim.device)
         self._course = course = sim._program.Course()
         course.table = self._upload(targets)
@@ -79,7 +78,6 @@ class Character:
             at = pose.Rotation.from_quat(t["body_turn"][model.body(name)]).apply(shape.pos)
             places.append(t["body_offset"][model.body(name)] + at)
         who.end_point = wp.array(np.array(places, np.float32), dtype=wp.vec3, device=self.sim.device)
-        who.rate_weight = RATE_WEIGHT
         return who
 
     def _choose(self, array: wp.array, rows) -> wp.array:
@@ -89,8 +87,8 @@ class Character:
         return array
 
     def sense(self, rows) -> np.ndarray:
-        """(world_count, WHOLE + 3 ends) of the present state, judged against the goals in `rows`
-        (world_count,): columns LEAN ... MISS, then the place [m] of each end in the facing frame."""
+        """(world_count, ENDS + 3 ends) of the present state, judged against the goals in `rows`
+        (world_count,): columns LEAN ... RATE, then the place [m] of each end in the facing frame."""
         self.sim._run(
             self._program, "sense", [self._who, *self._goals, self._choose(self._row, rows), self._out]
         )

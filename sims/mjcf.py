@@ -80,11 +80,13 @@ def wxyz(q: np.ndarray) -> np.ndarray:
     return np.roll(np.asarray(q, float), 1, axis=-1)
 
 
-def compile_mjcf(path: str | Path, rigid: tuple[str, ...] = (), pose: str = "start"):
+def compile_mjcf(
+    path: str | Path, rigid: tuple[str, ...] = (), pose: str = "start", without: tuple[str, ...] = ()
+):
     """MuJoCo's model of an MJCF file, and its keyframes: name -> {joint name: qpos} in joint order.
 
     Joints whose names match a pattern of `rigid` are frozen as they are in the keyframe `pose`, or in the
-    zero pose where there is no such keyframe. Raises ModelError.
+    zero pose where there is no such keyframe. The bodies of `without` are left out. Raises ModelError.
     """
     import mujoco
 
@@ -96,12 +98,17 @@ def compile_mjcf(path: str | Path, rigid: tuple[str, ...] = (), pose: str = "sta
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
         keys = {model.key(k).name: _by_joint(model, model.key_qpos[k]) for k in range(model.nkey)}
-        if rigid:
-            frozen = _freeze(spec, model, rigid, keys.get(pose, _by_joint(model, model.qpos0)), path)
+        if rigid or without:
+            for key in list(spec.keys):
+                spec.delete(key)
+            if rigid:
+                _freeze(spec, model, rigid, keys.get(pose, _by_joint(model, model.qpos0)), path)
+            for name in without:
+                _leave_out(spec, name, path)
             model = spec.compile()
+            left = {model.joint(j).name or f"joint{j}" for j in range(model.njnt)}
             keys = {
-                key: {name: q for name, q in joints.items() if name not in frozen}
-                for key, joints in keys.items()
+                key: {name: q for name, q in joints.items() if name in left} for key, joints in keys.items()
             }
     except (ValueError, RuntimeError) as error:
         if isinstance(error, ModelError):
@@ -119,16 +126,22 @@ def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> set[str]:
-    """Take the joints that match a pattern out of a spec, their bodies turned as in `pose`; their names."""
+def _leave_out(spec, name: str, path) -> None:
+    """Take a body at the top level, and all that hangs on it, out of a spec."""
+    body = spec.body(name)
+    if body is None or body.parent.name != "world":
+        raise ModelError(f"{path}: no body named '{name}' at the top level, to be left out")
+    spec.delete(body)
+
+
+def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> None:
+    """Take the joints that match a pattern out of a spec, their bodies turned as in `pose`."""
     frozen = {name for name in pose if any(fnmatch(name, pattern) for pattern in rigid)}
     if not frozen:
         raise ModelError(f"{path}: no joint is named like {', '.join(rigid)}")
     for actuator in list(spec.actuators):
         if actuator.target in frozen:
             spec.delete(actuator)
-    for key in list(spec.keys):
-        spec.delete(key)
     for joint in list(spec.joints):
         if joint.name not in frozen:
             continue
@@ -146,7 +159,6 @@ def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> set[str]:
         body.pos = m.body_pos[b] + frame.apply(anchor - turn.apply(anchor))
         body.quat = wxyz((frame * turn).as_quat())
         spec.delete(joint)
-    return frozen
 
 
 def check_supported(m, path: str | Path) -> None:

@@ -70,11 +70,17 @@ class Model:
     notes: list[str] = field(default_factory=list)
 
     @staticmethod
-    def load(name: str | Path = "player", rigid: tuple[str, ...] = (), pose: str = "start") -> Model:
+    def load(
+        name: str | Path = "player",
+        rigid: tuple[str, ...] = (),
+        pose: str = "start",
+        without: tuple[str, ...] = (),
+    ) -> Model:
         """Model of an MJCF file, or the shipped one by name ("player").
 
-        Joints whose names match a pattern of `rigid` are frozen as in the keyframe `pose`: with
-        `rigid=("*_mcp", "*_pip", "*_dip")` the player has stiff hands and 51 degrees of freedom.
+        Joints whose names match a pattern of `rigid` are frozen as in the keyframe `pose`, and the
+        bodies of `without` are left out: `rigid=("*_mcp", "*_pip", "*_dip"), without=("ball",)` is
+        a player with stiff hands and 51 degrees of freedom.
 
         Raises ModelError (a ValueError) when the file is missing, broken or holds something that is
         not simulated.
@@ -82,8 +88,8 @@ class Model:
         if str(name) == "player":
             from ..assets import path as asset
 
-            return load_mjcf(asset("player.xml"), "player", rigid, pose)
-        return load_mjcf(Path(name), Path(name).stem, rigid, pose)
+            return load_mjcf(asset("player.xml"), "player", rigid, pose, without)
+        return load_mjcf(Path(name), Path(name).stem, rigid, pose, without)
 
     def convert_q(self, other: Model, joint_q: np.ndarray) -> np.ndarray:
         """joint_q (..., nq) of another model with joints of the same names, for this one; joints that
@@ -150,8 +156,8 @@ def _index(names: list[str], name: str, what: str) -> int:
         raise KeyError(f"no {what} named {name!r}; there are: {known}") from None
 
 
-def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str) -> Model:
-    m, keys = compile_mjcf(path, rigid, pose)
+def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without: tuple[str, ...]) -> Model:
+    m, keys = compile_mjcf(path, rigid, pose, without)
     check_supported(m, path)
     t, bodies = read_links(m)
     inertia = read_inertia(m, **bodies, link_count=len(t.link_parent))
@@ -205,7 +211,9 @@ def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str) -> Model
         },
         keyframes={},
         texts={
-            _string(m.names, m.name_textadr[k]): _string(m.text_data, m.text_adr[k])
+            _string(m.names, m.name_textadr[k]): " ".join(
+                word for word in _string(m.text_data, m.text_adr[k]).split() if word not in without
+            )
             for k in range(m.ntext)
         },
         start_q=np.zeros(m.nq),

@@ -179,6 +179,11 @@ class Simulation(Batch):
         """Advance all worlds by `count` steps of `model.timestep`."""
         self._run(self._program, "step", [count, self._program.Course()])
 
+    @property
+    def forced(self) -> bool:
+        """Whether any external force was ever applied; kernels look for them from then on."""
+        return bool(self._tree.forced)
+
     # ------------------------------------------------------------------------------- observations
 
     @property
