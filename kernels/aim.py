@@ -22,18 +22,24 @@ class Course:
     """of `offset`, for each dof; or -1"""
 
 
-_ROW = "const float *row_ = (const float *)((const char *)table.data + (size_t)(row.data[g * row.shape[1]{}] + later) * table.strides[0])"
+_ROW = (
+    "const float *row_ = (const float *)"
+    "((const char *)table.data + (size_t)(row.data[g * row.shape[1] + lane_] + later) * table.strides[0]);"
+)
 _CHOOSE = (
-    f"{_ROW.format('')}; return row_[column];"
+    f"const int lane_ = 0; {_ROW} return row_[column];"
     if LANES == 1
-    else f"wp::vec_t<{LANES}, wp::float32> out_; for (int l = 0; l < {LANES}; ++l)"
-    f"{{ {_ROW.format(' + l')}; ((float *)&out_)[l] = row_[column]; }} return out_;"
+    else f"wp::vec_t<{LANES}, wp::float32> out_; for (int lane_ = 0; lane_ < {LANES}; ++lane_)"
+    f"{{ {_ROW} ((float *)&out_)[lane_] = row_[column]; }} return out_;"
 )
 
 
 @wp.func_native(_CHOOSE)
-def choose(table: wp.array2d(dtype=float), row: wp.array2d(dtype=int), g: int, later: int, column: int) -> Real:
-    """A number from a row of a table, `later` rows after the one that each world has chosen."""
+def choose(
+    table: wp.array2d(dtype=float), row: wp.array2d(dtype=int), g: int, later: int, column: int
+) -> Real:
+    """A number from a row of a table, `later` rows after the one that each world has chosen. Native,
+    as a lane at a time would go through memory."""
     ...
 
 

@@ -80,9 +80,8 @@ def miss(
     iq = tree.link_q[i]
     iv = tree.link_dof[i]
     if tree.link_joint[i] == HINGE:
-        return Miss(
-            size(world.q[g, iq] - choose(q, rows, g, 0, iq)), size(world.qd[g, iv] - choose(qd, rows, g, 0, iv))
-        )
+        angle = world.q[g, iq] - choose(q, rows, g, 0, iq)
+        return Miss(size(angle), size(world.qd[g, iv] - choose(qd, rows, g, 0, iv)))
     goal = Quat(
         choose(q, rows, g, 0, iq),
         choose(q, rows, g, 0, iq + 1),

@@ -36,7 +36,7 @@ def gather(
     state: wp.array(dtype=float),
     out: wp.array(dtype=float),
 ):
-    """out: the state that each world's source has, where that is another world. sources: `(groups, LANES)`."""
+    """out: the state that each world's source `(groups, LANES)` has, where that is another world."""
     g = first + wp.tid()
     for lane in range(LANES):
         source = sources[g, lane]

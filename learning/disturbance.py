@@ -30,6 +30,9 @@ class Disturbance:
     """[s] that such a force lasts, on average"""
 
 
+CALM = Disturbance()
+
+
 class Disturber:
     """Disturbs the worlds of a `Locomotion`, fragment by fragment; `group` worlds in a row feel the same."""
 

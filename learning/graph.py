@@ -41,7 +41,7 @@ class ControlGraph:
 
     def __post_init__(self):
         edges = np.asarray(self.edges, int).reshape(-1, 2)
-        if edges.size and not (0 <= edges.min() and edges.max() < self.count):
+        if edges.size and not (edges.min() >= 0 and edges.max() < self.count):
             raise ValueError(f"edges lead outside the {self.count} fragments of the graph")
         ends = np.setdiff1d(np.arange(self.count), edges[:, 0])
         if len(ends):

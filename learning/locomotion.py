@@ -60,7 +60,12 @@ class CostWeights:
     ends: float = 30.0
     """of the mean height of feet and head [m]"""
     balance: float = 10.0
-    """of the centre of mass over feet and head [1.6 m] + 0.1 its velocity [m/s]"""
+    """of where the centre of mass is over feet and head [1.6 m]"""
+    travel: float = 3.0
+    """of its velocity [m/s]"""
+
+
+WEIGHTS = CostWeights()
 
 
 def locomotion_model() -> Model:
@@ -78,7 +83,7 @@ class Locomotion:
         world_count: int,
         device: str = "cpu",
         threads: int | None = None,
-        weights: CostWeights = CostWeights(),
+        weights: CostWeights = WEIGHTS,
     ):
         self.model, self.graph, self.weights = model, graph, weights
         self.sim = Simulation(model, world_count, device, threads)
@@ -152,7 +157,8 @@ class Locomotion:
         E = w.pose * (felt[:, ANGLE] + 0.1 * felt[:, RATE])
         E = E + w.root * (off(LEAN) + 0.1 * off(SPIN))
         E = E + w.ends * height
-        E = E + w.balance * (over / HEIGHT_UNIT + 0.1 * off(COM_VELOCITY))
+        E = E + w.balance * over / HEIGHT_UNIT
+        E = E + w.travel * off(COM_VELOCITY)
         return np.where(self.fallen(felt, k), np.inf, E)
 
     def fallen(self, felt: np.ndarray, k) -> np.ndarray:

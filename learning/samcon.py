@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from .disturbance import Disturbance, Disturber
 from .locomotion import Locomotion
 from .policy import LinearPolicy
-from .trials import States, reference_states, run_trials
+from .trials import States, record_states, reference_states, run_trials
 
 SAVE_EVERY = 5
 """Fragments between states to go back to, and between recorded ones."""
@@ -36,13 +36,13 @@ SETTLED = 20
 class SamconConfig:
     """Parameters of Guided SAMCON."""
 
-    iterations: int = 150
+    iterations: int = 80
     """of expectation maximisation"""
     islands: int = 16
     """walks side by side, each with its own start and disturbances"""
     particles: int = 64
     """samples per fragment of each walk (N_s)"""
-    keep: float = 0.5
+    keep: float = 0.65
     """share of the particles that have children (n_save / N_s)"""
     walk: int = 160
     """fragments of a walk"""
@@ -62,7 +62,7 @@ class SamconConfig:
     """share of the old in the running mean of the policies"""
     speed_noise: float = 0.2
     """[rad/s, m/s] standard deviation of what is added to all joint velocities at a walk's start"""
-    disturbance: Disturbance = field(default=Disturbance(push=200.0, arms=0.2, hands=18.0))
+    disturbance: Disturbance = field(default=Disturbance(push=400.0, arms=0.2, hands=18.0))
     check_every: int = 10
     """iterations between trials of the policy"""
 
@@ -184,10 +184,10 @@ def improve(policy: LinearPolicy, seen: Walk, config: SamconConfig, feedback: bo
         return new
     W = np.concatenate(descendants(seen.parent, config.lag, end))
     used = W > 0
-    S, A, K = (np.concatenate(rows[:end])[used] for rows in (seen.S, seen.A, seen.k))
+    S, A, ks = (np.concatenate(rows[:end])[used] for rows in (seen.S, seen.A, seen.k))
     W = W[used].astype(float)
-    for k in np.unique(K):
-        s, a, w = (x[K == k] for x in (S, A, W))
+    for k in np.unique(ks):
+        s, a, w = (x[ks == k] for x in (S, A, W))
         w = w / w.sum()
         n = 1.0 / np.sum(w**2)
         mean_s, mean_a = w @ s, w @ a
@@ -231,7 +231,9 @@ class Samcon:
 
     def __init__(self, task: Locomotion, trial_task: Locomotion, config: SamconConfig, seed: int = 0):
         if task.sim.world_count != config.islands * config.particles:
-            raise ValueError(f"the task needs {config.islands * config.particles} worlds, a world per particle")
+            raise ValueError(
+                f"the task needs {config.islands * config.particles} worlds, a world per particle"
+            )
         self.task, self.trial_task, self.config, self.seed = task, trial_task, config, seed
         self.random = np.random.default_rng(seed)
         self.policy = LinearPolicy.zero(task.graph.count, task.actions, task.states, config.sigma)
@@ -240,11 +242,11 @@ class Samcon:
         self.best_score = -np.inf
         self.iteration = 0
         self.states = reference_states(task.graph)
-        self.recorded = False
+        self.best_states = self.states
 
     def iterate(self) -> Progress:
         """One E-step and M-step; the policies are tried now and then."""
-        began, samples, simulating = time.perf_counter(), self.task.samples, self.task.simulating
+        began, before = time.perf_counter(), self._spent
         c = self.config
         starts = self.states.draw(c.islands, self.random, c.speed_noise)
         seen = walk(self.task, self.policy, c, starts, self.random)
@@ -255,10 +257,11 @@ class Samcon:
             self._record(seen)
         self.iteration += 1
         survived = np.nan
-        seconds = time.perf_counter() - began
         if self.iteration % c.check_every == 0 or self.iteration == c.iterations:
             survived = self.check()
         E = np.concatenate(seen.E) if len(seen) else np.zeros(0)
+        seconds = time.perf_counter() - began
+        samples, simulating = np.subtract(self._spent, before) / seconds
         return Progress(
             iteration=self.iteration,
             cost=float(E[np.isfinite(E)].mean()) if np.isfinite(E).any() else np.nan,
@@ -267,9 +270,15 @@ class Samcon:
             sigma=float(self.policy.sigma.mean()),
             score=float(self.best_score),
             survived=survived,
-            samples_per_second=(self.task.samples - samples) / seconds,
-            outside=1.0 - (self.task.simulating - simulating) / seconds,
+            samples_per_second=float(samples),
+            outside=float(1.0 - simulating),
         )
+
+    @property
+    def _spent(self) -> tuple[float, float]:
+        """Fragments simulated so far, and the seconds that the simulation took."""
+        tasks = self.task, self.trial_task
+        return sum(task.samples for task in tasks), sum(task.simulating for task in tasks)
 
     def _record(self, seen: Walk) -> None:
         """Take states that the policy comes through as the starts of the next walks."""
@@ -292,10 +301,12 @@ class Samcon:
                 speed_noise=self.config.speed_noise,
                 disturbance=self.config.disturbance,
             )
-            score = trials.lived.mean() - 0.01 * trials.cost
+            score = trials.lived.mean() - 0.01 * np.nan_to_num(trials.cost)
             survived = float(trials.survived.mean())
             if score > self.best_score:
                 self.best, self.best_score = policy.copy(), score
+                unpushed = replace(self.config.disturbance, push=0.0)
+                self.best_states = record_states(self.trial_task, policy, self.states, self.seed, unpushed)
         return survived
 
     def learn(self, progress: Callable[[Progress], None] | None = None) -> LinearPolicy:
@@ -313,7 +324,8 @@ class Samcon:
 
         policies = {"policy": self.policy, "mean": self.mean, "best": self.best}
         arrays = {f"{name}.{x}": v for name, p in policies.items() for x, v in vars(p).items()}
-        arrays |= {f"states.{x}": v for x, v in vars(self.states).items()}
+        states = {"states": self.states, "best_states": self.best_states}
+        arrays |= {f"{name}.{x}": v for name, s in states.items() for x, v in vars(s).items()}
         random = json.dumps(self.random.bit_generator.state)
         return arrays | {
             "iteration": np.array(self.iteration),
@@ -327,6 +339,7 @@ class Samcon:
 
         for name in ("policy", "mean", "best"):
             setattr(self, name, LinearPolicy(*(state[f"{name}.{x}"] for x in ("M", "a_hat", "sigma"))))
-        self.states = States(*(state[f"states.{x}"] for x in ("k", "joint_q", "joint_qd")))
+        for name in ("states", "best_states"):
+            setattr(self, name, States(*(state[f"{name}.{x}"] for x in ("k", "joint_q", "joint_qd"))))
         self.iteration, self.best_score = int(state["iteration"]), float(state["best_score"])
         self.random.bit_generator.state = json.loads(str(state["random"]))

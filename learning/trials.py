@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..sims.character import ANGLE, ENDS
-from .disturbance import PUSHED, Disturbance, Disturber
+from .disturbance import CALM, PUSHED, Disturbance, Disturber
 from .graph import ControlGraph
 from .locomotion import Locomotion
 from .policy import LinearPolicy
@@ -40,6 +40,39 @@ def reference_states(graph: ControlGraph) -> States:
     return States(np.arange(graph.count), graph.start_q, graph.start_qd)
 
 
+def record_states(
+    task: Locomotion,
+    policy: LinearPolicy,
+    states: States,
+    seed: int = 0,
+    disturbance: Disturbance = CALM,
+    every: int = 7,
+    settled: int = 60,
+    ahead: int = 40,
+) -> States:
+    """States that a policy comes through and lives on from: those of all worlds of the task, at every
+    `every`th fragment, `settled` fragments after a random start and with `ahead` fragments still to
+    stand. The given states where there are none."""
+    random = np.random.default_rng(seed)
+    graph, n = task.graph, task.sim.world_count
+    start = states.draw(n, random)
+    k = start.k
+    felt = task.reset(k, start.joint_q, start.joint_qd)
+    disturber = Disturber(disturbance, task, random)
+    stands, rows, seen = np.ones(n, bool), settled + graph.count, []
+    for row in range(rows + ahead):
+        if settled <= row < rows and row % every == 0:
+            seen.append((k, task.sim.joint_q, task.sim.joint_qd))
+        disturber.apply()
+        felt = task.advance(k, policy.act(task.state(felt, k), k))
+        stands &= ~task.fallen(felt, k)
+        k = graph.follow(k, random)
+    task.calm()
+    if not stands.any():
+        return states
+    return States(*(np.concatenate([part[stands] for part in parts]) for parts in zip(*seen)))
+
+
 @dataclass
 class Trials:
     """What became of each trial."""
@@ -68,7 +101,7 @@ def run_trials(
     cycles: float,
     seed: int = 0,
     speed_noise: float = 0.0,
-    disturbance: Disturbance = Disturbance(),
+    disturbance: Disturbance = CALM,
     progress=None,
 ) -> Trials:
     """One trial per world of the task, each from a random state, for a number of cycles (as many fragments as
@@ -150,7 +183,8 @@ def relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def composed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Planar poses reached by going a and from there b, all (n, 3)."""
     c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
-    return np.stack([a[:, 0] + c * b[:, 0] - s * b[:, 1], a[:, 1] + s * b[:, 0] + c * b[:, 1], a[:, 2] + b[:, 2]], 1)
+    x, y = a[:, 0] + c * b[:, 0] - s * b[:, 1], a[:, 1] + s * b[:, 0] + c * b[:, 1]
+    return np.stack([x, y, a[:, 2] + b[:, 2]], axis=1)
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
@@ -167,8 +201,8 @@ def push_survival(
     task: Locomotion, policy: LinearPolicy, states: States, force: float, seconds: float = 0.2, seed: int = 0
 ) -> np.ndarray:
     """Share (8,) of players that stand AFTER seconds after a push of `force` [N] on the torso, by the
-    direction of the push from the way they face: forward, forward left, left, ... The worlds of the
-    task share the directions; each is pushed at a random moment."""
+    direction of the push from the way they face: forward, forward left, left, ...; NaN where nobody stood
+    to be pushed. The worlds of the task share the directions; each is pushed at a random moment."""
     random = np.random.default_rng(seed)
     graph, n = task.graph, task.sim.world_count
     start = states.draw(n, random)
@@ -191,5 +225,6 @@ def push_survival(
         fell |= task.fallen(felt, k)
         k = graph.follow(k, random)
     task.calm()
-    counted = ~before
-    return np.array([1.0 - fell[counted & (which == d)].mean() for d in range(DIRECTIONS)])
+    pushed = np.bincount(which[~before], minlength=DIRECTIONS)
+    stood = np.bincount(which[~before & ~fell], minlength=DIRECTIONS)
+    return np.divide(stood, pushed, out=np.full(DIRECTIONS, np.nan), where=pushed > 0)

@@ -49,9 +49,7 @@ class Batch:
     its worlds; on CUDA a group is one world, and neighbouring worlds lie side by side.
     """
 
-    def __init__(
-        self, model: Model, world_count: int, device: str, threads: int | None, lanes: int | None
-    ):
+    def __init__(self, model: Model, world_count: int, device: str, threads: int | None, lanes: int | None):
         if world_count < 1:
             raise ValueError(f"world_count must be at least 1, not {world_count}")
         if threads is not None and threads < 1:
@@ -127,7 +125,9 @@ class Batch:
         for count, dtype in arrays.values():
             count = max(count, 1)
             parts = wp.types.type_size_in_bytes(dtype) // (4 * lanes)
-            strides = (parts, groups * parts) if self._side_by_side else (count * parts * lanes, parts * lanes)
+            strides = (count * parts * lanes, parts * lanes)
+            if self._side_by_side:
+                strides = (parts, groups * parts)
             blocks.append((start, count, parts, *strides))
             start += groups * count * parts * lanes
         self._carried = wp.zeros(start, dtype=float, device=self.device)

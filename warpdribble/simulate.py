@@ -178,7 +178,7 @@ def simulate(
         )
     time_in_play = _time_in_play(model, body_q) if ball is not None else np.zeros(worlds)
     best = int(np.argmax(np.where(sound, time_in_play, -1.0)))
-    return _measure(model, reference, body_q[:, best], states[:, best], wall_time)
+    return measure(model, reference, body_q[:, best], states[:, best], wall_time)
 
 
 def _put_ball(model, joint_q, joint_qd, ball: BallStart) -> None:
@@ -209,7 +209,8 @@ def _time_in_play(model, body_q) -> np.ndarray:
     return np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
 
 
-def _measure(model, reference: Reference, body_q, states, wall_time: float) -> Run:
+def measure(model, reference: Reference, body_q, states, wall_time: float) -> Run:
+    """A run, from what was recorded of it: body_q (frames, nbody, 7), states (frames, nq)."""
     wanted = pose.forward(model, reference.joint_q)
     root = pose.joint_body(model, root_joint(model))
     counted = [b for b in gaps.descendants(model, root) if model.body_mass[b] > LIGHT]

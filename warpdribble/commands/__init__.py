@@ -4,7 +4,10 @@ A new command is a dataclass with a `run() -> int` (the exit status) and a line 
 wrong with the input is raised as ValueError or OSError, its message one line that says what to do.
 """
 
+from .evaluate import Evaluate
+from .export import Export
 from .fetch import Fetch
+from .learn import Learn
 from .motion import MotionGroup
 from .simulate import Demo, Simulate
 from .skill import SkillGroup
@@ -15,6 +18,9 @@ COMMANDS = {
     "motion": MotionGroup,
     "fetch": Fetch,
     "skill": SkillGroup,
+    "learn": Learn,
+    "evaluate": Evaluate,
+    "export": Export,
 }
 
 __all__ = ["COMMANDS"]

@@ -12,33 +12,51 @@ def say(line: str) -> None:
     print(line, flush=True)
 
 
-def ready(model, worlds: int, device: str):
-    """A simulation that has compiled what it needs; the wait is shown."""
+@contextlib.contextmanager
+def compiling():
+    """Show, on stderr, that kernels are compiled meanwhile."""
     from rich.console import Console
-
-    from ..sims import Simulation
 
     waiting = "compiling kernels (once; about a minute the first time, then cached) ..."
     console = Console(stderr=True)
     if not console.is_terminal:
         print(waiting, file=sys.stderr, flush=True)
     with console.status(waiting):
+        yield
+
+
+def ready(model, worlds: int, device: str):
+    """A simulation that has compiled what it needs; the wait is shown."""
+    from ..sims import Simulation
+
+    with compiling():
         sim = Simulation(model, world_count=worlds, device=device)
         sim.step(1)
         sim.reset()
     return sim
 
 
+def warmed(task):
+    """A learning task that has compiled what it needs."""
+    import numpy as np
+
+    worlds = np.arange(task.sim.world_count)
+    task.advance(0 * worlds, 0.0)
+    task.sim.copy_worlds(worlds)
+    task.sim.bodies()
+    return task
+
+
 @contextlib.contextmanager
 def bar(label: str, total: int):
-    """Progress of a long job on stderr: yields what to call with the steps done."""
+    """Progress of a long job on stderr: yields what to call with the steps done, and a note to show."""
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(label, total=total)
-        yield lambda done: bar.update(task, completed=done)
+        yield lambda done, note="": bar.update(task, completed=done, description=f"{label}{note}")
 
 
 def quiet_warp() -> None:
@@ -52,3 +70,18 @@ def check_device(device: str) -> None:
     """Raise ValueError for what is no device's name."""
     if not re.fullmatch(r"cpu|cuda(:\d+)?", device):
         raise ValueError(f"--device {device}: give cpu, cuda or cuda:0, cuda:1, ...")
+
+
+def find_device(device: str) -> None:
+    """Raise ValueError for a device that is not there. Silences Warp."""
+    from ..sims import batch
+
+    check_device(device)
+    quiet_warp()
+    batch.find_device(device)
+
+
+def check_range(option: str, value: float, least: float, most: float) -> None:
+    """Raise ValueError for a number outside a range, or none."""
+    if not least <= value <= most:
+        raise ValueError(f"{option} {value:g}: give a number from {least:g} to {most:g}")

@@ -8,6 +8,7 @@ from typing import Literal
 
 from .clip_input import ClipInput
 from .console import bar, check_device, quiet_warp, ready, say
+from .output import check_outputs, say_run, write_outputs
 
 LONGEST = 600.0
 """[s] of one take."""
@@ -77,15 +78,11 @@ class Demo:
 
 def _check(command: Simulate | Demo) -> None:
     """Raise ValueError or OSError for what cannot work, before anything is computed."""
-    from ..take import check_writable
-
     if command.repeat < 1:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
     check_device(command.device)
     quiet_warp()
-    check_writable(command.out)
-    for other in (".png", ".plots.png", ".html"):
-        check_writable(command.out.with_suffix(other), (".png", ".html"))
+    check_outputs(command.out)
 
 
 def _demo(command: Demo, model) -> int:
@@ -161,60 +158,11 @@ def _check_length(reference, repeat: int) -> None:
 
 def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> None:
     """Simulate, say how it went, and write the take and its picture."""
-    from .. import __version__
-    from ..plots import write_plots
-    from ..replay import write_replay
-    from ..sheet import write_sheet
     from ..simulate import TRIES, simulate
-    from ..take import Take, validate, write_take
 
     tries = TRIES if ball is not None and reference.duration < SHORT else 1
     sim = ready(model, tries, command.device)
     with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
         run = simulate(sim, reference, command.root, ball, progress)
-    _summary(run, command)
-    take = Take.of(
-        model,
-        run.body_q,
-        fps=1.0 / model.timestep,
-        notes={"creator": f"warpdribble {__version__}", "clip": source, "root": command.root},
-    )
-    heights = {
-        label: run.body_q[:, model.body(body), 2]
-        for label, body in (("right hand", "r_hand"), ("left hand", "l_hand"))
-        if body in model.body_names
-    }
-    picture = command.out.with_suffix(".png")
-    plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
-    title = f"{source}, root {command.root}"
-    write_take(command.out, take, skin=command.skin, joints=command.usd_joints)
-    write_sheet(picture, take, heights, run.contacts, title)
-    roots = run.root_paths(model)
-    write_plots(plots, take.fps, *roots, run.angle_error, run.position_error, run.fallen, title)
-    if command.html:
-        write_replay(replay, take, run.contacts, title, skin=command.skin)
-    errors = validate(command.out)
-    state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
-    say(f"take      {command.out} ({len(take.body_q)} frames at {take.fps:g} fps, {state})")
-    say(f"pictures  {picture}, {plots.name}")
-    if command.html:
-        say(f"replay    {replay} (open it in a browser)")
-
-
-def _summary(run, command) -> None:
-    import numpy as np
-
-    fell = f", first at {run.fallen.argmax() * run.reference.timestep:.2f} s" if run.falls else ""
-    say(
-        f"simulated {run.reference.duration:.2f} s with root {command.root}, "
-        f"{run.real_time_factor:.1f} x real time"
-    )
-    say(
-        f"tracking  joints {np.degrees(run.angle_error.mean()):.1f} degrees, "
-        f"bodies {100.0 * run.position_error.mean():.1f} cm off (means, fingers left out)"
-    )
-    say(f"falls     {run.falls}{fell}")
-    if "ball on ground" in run.contacts:
-        ground = run.contacts["ball on ground"]
-        bounces = int(np.sum(ground[1:] & ~ground[:-1]))
-        say(f"ball      {bounces} bounces (put in play, not yet controlled)")
+    say_run(run, command.root)
+    write_outputs(command, model, run, source, command.root)
