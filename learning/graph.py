@@ -87,7 +87,8 @@ def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph
     rows = cycle.reference.frame_count - 1
     count = round(rows / STEPS)
     if count < SHORTEST:
-        raise ValueError(f"a cycle of {cycle.reference.duration:.2f} s is too short: give 0.2 s or more")
+        least = SHORTEST * STEPS * cycle.reference.timestep
+        raise ValueError(f"a cycle of {cycle.reference.duration:.2f} s is too short: give {least:.2f} s or more")
     at = np.linspace(0.0, rows, count * STEPS + 1)
     fitted = Reference(resample_q(model, cycle.reference.joint_q, at), cycle.reference.timestep)
     several = Cycle(fitted, cycle.turn, cycle.travel).repeat(model, 3)
@@ -109,7 +110,13 @@ def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph
 
 def joined(graphs: list[ControlGraph], transitions) -> ControlGraph:
     """Several graphs as one. transitions: ((graph, fragment), (graph, fragment)) pairs, of which the second
-    may follow the first; nothing is blended, so they should lead between similar states."""
+    may follow the first; nothing is blended, so they should lead between similar states. Raises ValueError
+    for a fragment that is not there, or graphs of different time steps."""
+    if len({g.timestep for g in graphs}) != 1:
+        raise ValueError(f"the graphs have different time steps: {[g.timestep for g in graphs]} s")
+    for graph, fragment in (end for edge in transitions for end in edge):
+        if not (0 <= graph < len(graphs) and 0 <= fragment < graphs[graph].count):
+            raise ValueError(f"a transition names fragment {fragment} of graph {graph}: there is none")
     first = np.concatenate([[0], np.cumsum([g.count for g in graphs])[:-1]])
     between = [[first[a] + i, first[b] + j] for (a, i), (b, j) in transitions]
     edges = [g.edges + start for g, start in zip(graphs, first)]

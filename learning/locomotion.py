@@ -44,7 +44,7 @@ STATE = (
 )
 """Parts of the 18-number reduced state, and the deviation that counts as one."""
 FALLEN = 0.3
-"""[m] A root this far below the reference's has fallen."""
+"""[m] A root this far below, or above, the reference's is out of control."""
 HEIGHT_UNIT = 1.6
 """[m] of the balance cost"""
 
@@ -162,6 +162,6 @@ class Locomotion:
         return np.where(self.fallen(felt, k), np.inf, E)
 
     def fallen(self, felt: np.ndarray, k) -> np.ndarray:
-        """Who (world_count,) lies on the ground, or about to."""
-        down = self.sim.status & (FALL | NONFINITE) != 0
-        return down | ~(felt[:, HEIGHT][:, 0] > self.goal[k, HEIGHT][:, 0] - FALLEN)
+        """Who (world_count,) lies on the ground or is about to; or has left it, flung by something absurd."""
+        off = felt[:, HEIGHT][:, 0] - self.goal[k, HEIGHT][:, 0]
+        return (self.sim.status & (FALL | NONFINITE) != 0) | ~(np.abs(off) < FALLEN)

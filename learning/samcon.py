@@ -138,6 +138,7 @@ def walk(task: Locomotion, policy: LinearPolicy, config: SamconConfig, starts: S
         if row % SAVE_EVERY == SAVE_EVERY - 1:
             best = np.arange(0, n, config.particles) + np.argmin(E[parent].reshape(islands, -1), axis=1)
             seen.states.append((row, k[best], task.sim.joint_q[best], task.sim.joint_qd[best]))
+    task.calm()
     seen.whole = len(seen) == config.walk
     return seen
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..sims.character import ANGLE, ENDS
-from .disturbance import CALM, PUSHED, Disturbance, Disturber
+from .disturbance import CALM, Disturbance, Disturber
 from .graph import ControlGraph
 from .locomotion import Locomotion
 from .policy import LinearPolicy
@@ -168,9 +167,10 @@ class Errors:
 
 
 def planar(joint_q: np.ndarray) -> np.ndarray:
-    """Place and heading (n, 3) [m, m, rad] of roots over the ground."""
-    forward = Rotation.from_quat(joint_q[:, 3:7]).apply([1.0, 0.0, 0.0])
-    return np.stack([joint_q[:, 0], joint_q[:, 1], np.arctan2(forward[:, 1], forward[:, 0])], axis=1)
+    """Place and heading (n, 3) [m, m, rad] of roots over the ground; not finite where they are not."""
+    x, y, z, w = joint_q[:, 3:7].T
+    heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return np.stack([joint_q[:, 0], joint_q[:, 1], heading], axis=1)
 
 
 def relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -190,41 +190,3 @@ def composed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def wrapped(angle: np.ndarray) -> np.ndarray:
     """The same angle within half a turn [rad]."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
-
-DIRECTIONS = 8
-SETTLE, AFTER = 1.0, 4.0
-"""[s] before a push, and within which a fall is put down to it."""
-
-
-def push_survival(
-    task: Locomotion, policy: LinearPolicy, states: States, force: float, seconds: float = 0.2, seed: int = 0
-) -> np.ndarray:
-    """Share (8,) of players that stand AFTER seconds after a push of `force` [N] on the torso, by the
-    direction of the push from the way they face: forward, forward left, left, ...; NaN where nobody stood
-    to be pushed. The worlds of the task share the directions; each is pushed at a random moment."""
-    random = np.random.default_rng(seed)
-    graph, n = task.graph, task.sim.world_count
-    start = states.draw(n, random)
-    k = start.k
-    felt = task.reset(k, start.joint_q, start.joint_qd)
-    task.calm()
-    which = np.arange(n) % DIRECTIONS
-    begins = round(SETTLE / graph.period) + random.integers(graph.count, size=n)
-    lasts = max(1, round(seconds / graph.period))
-    fell, applied = np.zeros(n, bool), np.zeros((n, 3))
-    before = np.zeros(n, bool)
-    for row in range(begins.max() + lasts + round(AFTER / graph.period)):
-        facing = planar(task.sim.joint_q)[:, 2] + which * 2.0 * np.pi / DIRECTIONS
-        new = row == begins
-        applied[new] = force * np.stack([np.cos(facing), np.sin(facing), 0.0 * facing], axis=1)[new]
-        applied[row == begins + lasts] = 0.0
-        task.sim.apply_force(PUSHED, applied)
-        before |= fell & new
-        felt = task.advance(k, policy.act(task.state(felt, k), k))
-        fell |= task.fallen(felt, k)
-        k = graph.follow(k, random)
-    task.calm()
-    pushed = np.bincount(which[~before], minlength=DIRECTIONS)
-    stood = np.bincount(which[~before & ~fell], minlength=DIRECTIONS)
-    return np.divide(stood, pushed, out=np.full(DIRECTIONS, np.nan), where=pushed > 0)

@@ -80,8 +80,10 @@ class Character:
         who.end_point = wp.array(np.array(places, np.float32), dtype=wp.vec3, device=self.sim.device)
         return who
 
-    def _choose(self, array: wp.array, rows) -> wp.array:
+    def _choose(self, array: wp.array, rows, end: int) -> wp.array:
         rows = np.broadcast_to(np.asarray(rows, np.int32), (self.sim.world_count,))
+        if rows.min() < 0 or rows.max() >= end:
+            raise IndexError(f"rows must lie in 0 .. {end - 1}")
         spare = self.sim.groups * self.sim.lanes - self.sim.world_count
         array.assign(np.pad(rows, (0, spare), mode="edge").reshape(array.shape))
         return array
@@ -90,7 +92,9 @@ class Character:
         """(world_count, ENDS + 3 ends) of the present state, judged against the goals in `rows`
         (world_count,): columns LEAN ... RATE, then the place [m] of each end in the facing frame."""
         self.sim._run(
-            self._program, "sense", [self._who, *self._goals, self._choose(self._row, rows), self._out]
+            self._program,
+            "sense",
+            [self._who, *self._goals, self._choose(self._row, rows, self._goals[0].shape[0]), self._out],
         )
         return self.sim._read(self._out)
 
@@ -98,6 +102,8 @@ class Character:
         """Advance all worlds by `count` steps, the drives' targets going along the table from `rows`
         (world_count,) on, those of the steered joints offset by (world_count, columns) [rad]: an angle for
         a hinge, a rotation vector in the turned joint's axes for a ball joint."""
-        self._choose(self._course.row, rows)
+        self._choose(self._course.row, rows, self._course.table.shape[0] - count + 1)
+        if np.shape(offset) != (self.sim.world_count, self.columns):
+            raise ValueError(f"offset must have shape ({self.sim.world_count}, {self.columns})")
         self.sim._fill(self._course.offset, offset)
         self.sim._run(self.sim._program, "step", [count, self._course])

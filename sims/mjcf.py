@@ -83,7 +83,8 @@ def wxyz(q: np.ndarray) -> np.ndarray:
 def compile_mjcf(
     path: str | Path, rigid: tuple[str, ...] = (), pose: str = "start", without: tuple[str, ...] = ()
 ):
-    """MuJoCo's model of an MJCF file, and its keyframes: name -> {joint name: qpos} in joint order.
+    """MuJoCo's model of an MJCF file; its keyframes: name -> {joint name: qpos} in joint order; and the names
+    of the bodies that were left out.
 
     Joints whose names match a pattern of `rigid` are frozen as they are in the keyframe `pose`, or in the
     zero pose where there is no such keyframe. The bodies of `without` are left out. Raises ModelError.
@@ -98,15 +99,20 @@ def compile_mjcf(
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()
         keys = {model.key(k).name: _by_joint(model, model.key_qpos[k]) for k in range(model.nkey)}
+        bodies = {model.body(b).name for b in range(model.nbody)}
         if rigid or without:
+            for joint in spec.joints:  # numbers change when others go, names stay
+                joint.name = joint.name or f"joint{joint.id}"
             for key in list(spec.keys):
                 spec.delete(key)
             if rigid:
                 _freeze(spec, model, rigid, keys.get(pose, _by_joint(model, model.qpos0)), path)
             for name in without:
                 _leave_out(spec, name, path)
+            if len(spec.bodies) < 2:
+                raise ModelError(f"{path}: nothing is left without {', '.join(without)}")
             model = spec.compile()
-            left = {model.joint(j).name or f"joint{j}" for j in range(model.njnt)}
+            left = {model.joint(j).name for j in range(model.njnt)}
             keys = {
                 key: {name: q for name, q in joints.items() if name in left} for key, joints in keys.items()
             }
@@ -115,7 +121,7 @@ def compile_mjcf(
             raise
         reason = " ".join(str(error).split())
         raise ModelError(f"{path}: not a valid MJCF file: {reason}") from None
-    return model, keys
+    return model, keys, bodies - {model.body(b).name for b in range(model.nbody)}
 
 
 def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
@@ -129,7 +135,7 @@ def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
 def _leave_out(spec, name: str, path) -> None:
     """Take a body at the top level, and all that hangs on it, out of a spec."""
     body = spec.body(name)
-    if body is None or body.parent.name != "world":
+    if body is None or body.parent is None or body.parent.name != "world":
         raise ModelError(f"{path}: no body named '{name}' at the top level, to be left out")
     spec.delete(body)
 

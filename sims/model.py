@@ -157,7 +157,7 @@ def _index(names: list[str], name: str, what: str) -> int:
 
 
 def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without: tuple[str, ...]) -> Model:
-    m, keys = compile_mjcf(path, rigid, pose, without)
+    m, keys, gone = compile_mjcf(path, rigid, pose, without)
     check_supported(m, path)
     t, bodies = read_links(m)
     inertia = read_inertia(m, **bodies, link_count=len(t.link_parent))
@@ -212,7 +212,7 @@ def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without:
         keyframes={},
         texts={
             _string(m.names, m.name_textadr[k]): " ".join(
-                word for word in _string(m.text_data, m.text_adr[k]).split() if word not in without
+                word for word in _string(m.text_data, m.text_adr[k]).split() if word not in gone
             )
             for k in range(m.ntext)
         },

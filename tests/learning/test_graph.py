@@ -254,14 +254,12 @@ def test_joined_graphs_are_walked_in_the_simulation(player, graph, curve, task):
     assert np.isfinite(worlds.cost(felt, k)).all()
 
 
-@pytest.mark.xfail(reason="a number beyond the first graph's end is taken for the second's")
 def test_a_transition_from_outside_its_graph_is_refused():
     a = of([[0, 1], [1, 0]])
     with pytest.raises(ValueError):
         joined([a, a], [((0, 2), (1, 0))])
 
 
-@pytest.mark.xfail(reason="the first graph's time step is taken for all")
 def test_graphs_with_different_time_steps_are_not_joined():
     with pytest.raises(ValueError):
         joined([of([[0, 0]]), of([[0, 0]], step=0.005)], [])

@@ -14,7 +14,6 @@ from warpdribble.take import validate
 
 NAME = "dribble-right-authored"
 SMALL = SamconConfig(iterations=6, islands=4, particles=32, walk=60, check_every=3)
-DIRECTIONS = 8
 
 
 @pytest.fixture(scope="module")
@@ -115,29 +114,15 @@ def test_pushes_and_open_loop_are_harder(run, capsys):
 
 
 def test_a_table_of_pushes(run, capsys, monkeypatch):
-    from warpdribble.commands import evaluate
-
-    monkeypatch.setattr(evaluate, "FORCES", (1, 1000))
-    monkeypatch.setattr(evaluate, "PUSHED", 8)
-    table = evaluated(capsys, run, "--cycles", "1", "--trials", "2", "--pushes")["pushes"]
-    assert table["forces"] == [1, 1000] and len(table["directions"]) == DIRECTIONS
-    shares = np.array(table["survived"], float)
-    assert shares.shape == (2, DIRECTIONS)
-    assert shares[0].mean() > 0.8 and shares[1].mean() < 0.2
-    assert list(table["largest"].values()) == [1.0 * (share >= 0.95) for share in shares[0]]
-    assert table["largest_in_every_direction"] == min(table["largest"].values())
-
-
-def test_the_largest_push_is_the_last_before_the_first_that_is_lost(run, capsys, monkeypatch):
-    from warpdribble.commands import evaluate
-    from warpdribble.learning import trials
+    """A force in which a direction is lost before the push is null in JSON and a dash to read."""
+    from warpdribble.learning import pushes
 
     shares = {10: [1.0] * 8, 20: [0.95] * 7 + [0.5], 30: [float("nan")] + [0.9] * 6 + [1.0], 40: [1.0] * 8}
-    monkeypatch.setattr(evaluate, "FORCES", tuple(shares))
-    monkeypatch.setattr(trials, "push_survival", lambda *a, **_: np.array(shares[a[3]]))
+    monkeypatch.setattr(pushes, "FORCES", tuple(shares))
+    monkeypatch.setattr(pushes, "push_survival", lambda *a, **_: np.array(shares[a[3]]))
     arguments = ("--cycles", "1", "--trials", "2", "--pushes")
     table = evaluated(capsys, run, *arguments)["pushes"]
-    assert table["forces"] == [10, 20, 30]
+    assert table["forces"] == [10, 20, 30] and len(table["directions"]) == 8
     assert table["survived"][2][0] is None
     assert list(table["largest"].values()) == [20.0] * 7 + [10.0]
     assert table["largest_in_every_direction"] == 10.0

@@ -12,24 +12,6 @@ from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed
 
-DIRECTIONS = (
-    "forward",
-    "forward left",
-    "left",
-    "back left",
-    "back",
-    "back right",
-    "right",
-    "forward right",
-)
-"""Of pushes, from the way the player faces; as `push_survival` has them."""
-PUSHED = 64
-"""Players pushed in each direction."""
-FORCES = tuple(range(50, 1001, 50))
-"""[N] tried in turn, until all directions are lost."""
-ENOUGH = 0.95
-"""Share that has to survive a push that counts as survived."""
-
 
 @dataclass
 class Evaluate:
@@ -43,6 +25,10 @@ class Evaluate:
     """How many, each from a random state."""
     push: float = 0.0
     """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
+    arms: float = 0.0
+    """[rad] Standard deviation of random offsets of the arms' targets, drawn every 0.05 s."""
+    hands: float = 0.0
+    """[N] Largest random force on each hand; dribbling takes about 18 N."""
     noise: float = 0.15
     """[rad/s, m/s] Standard deviation of what is added to all joint speeds at the start."""
     seed: int = 1
@@ -59,12 +45,15 @@ class Evaluate:
     def run(self) -> int:
         from ..learning.disturbance import Disturbance
         from ..learning.policy import LinearPolicy
+        from ..learning.pushes import FORCES, PUSHED, push_table
         from ..learning.run import Run
         from ..learning.trials import run_trials
 
         check_range("--cycles", self.cycles, 0.1, 1e5)
         check_range("--trials", self.trials, 1, 2**16)
         check_range("--push", self.push, 0.0, 1e4)
+        check_range("--arms", self.arms, 0.0, 10.0)
+        check_range("--hands", self.hands, 0.0, 1e4)
         check_range("--noise", self.noise, 0.0, 100.0)
         check_range("--seed", self.seed, 0, 2**32)
         run = Run.load(self.folder)
@@ -82,7 +71,7 @@ class Evaluate:
                 self.cycles,
                 self.seed,
                 self.noise,
-                Disturbance(push=self.push),
+                Disturbance(push=self.push, arms=self.arms, hands=self.hands),
                 progress,
             )
         report = {
@@ -95,6 +84,8 @@ class Evaluate:
             "seconds": self.cycles * task.graph.count * task.graph.period,
             "noise": self.noise,
             "push": self.push,
+            "arms": self.arms,
+            "hands": self.hands,
             "seed": self.seed,
             "survived": int(trials.survived.sum()),
             "lived": float(trials.lived.mean()),
@@ -105,7 +96,9 @@ class Evaluate:
             "turn_deg_per_cycle": _number(math.degrees(trials.turn)),
         }
         if self.pushes:
-            report["pushes"] = self._push_table(run, policy)
+            with bar("pushes", len(FORCES)) as progress:
+                table = push_table(run.task(PUSHED, self.device), policy, run.states, self.seed, progress)
+            report["pushes"] = _plain(table)
         if self.format == "json":
             say(json.dumps(report, indent=2, allow_nan=False))
         else:
@@ -113,38 +106,25 @@ class Evaluate:
                 say(line)
         return 0
 
-    def _push_table(self, run, policy) -> dict:
-        """Shares that survive a push, a row per force, and the largest that ENOUGH survive (0 for none)."""
-        import numpy as np
-
-        from ..learning.trials import push_survival
-
-        task = run.task(PUSHED * len(DIRECTIONS), self.device)
-        rows, holds = [], np.ones(len(DIRECTIONS), bool)
-        largest = np.zeros(len(DIRECTIONS))
-        with bar("pushes", len(FORCES)) as progress:
-            for force in FORCES:
-                shares = push_survival(task, policy, run.states, force, seed=self.seed)
-                rows.append([_number(share) for share in shares])
-                holds &= shares >= ENOUGH
-                largest[holds] = force
-                progress(len(rows), f" of {force} N")
-                if not holds.any():
-                    break
-        return {
-            "seconds": 0.2,
-            "per_direction": PUSHED,
-            "forces": list(FORCES[: len(rows)]),
-            "directions": list(DIRECTIONS),
-            "survived": rows,
-            "largest": dict(zip(DIRECTIONS, largest.tolist())),
-            "largest_in_every_direction": float(largest.min()),
-        }
-
 
 def _number(value: float) -> float | None:
     """JSON has no NaN."""
     return float(value) if math.isfinite(value) else None
+
+
+def _plain(table) -> dict:
+    from ..learning.pushes import DIRECTIONS, ENOUGH, PUSH_TIME
+
+    largest = table.largest()
+    return {
+        "seconds": PUSH_TIME,
+        "enough": ENOUGH,
+        "forces": table.forces,
+        "directions": list(DIRECTIONS),
+        "survived": [[_number(share) for share in row] for row in table.survived],
+        "largest": dict(zip(DIRECTIONS, largest.tolist())),
+        "largest_in_every_direction": float(largest.min()),
+    }
 
 
 def _text(report: dict) -> list[str]:
@@ -155,7 +135,8 @@ def _text(report: dict) -> list[str]:
     lines = [
         f"run       {report['run']}: {report['skill']}, {policy}",
         f"trials    {report['trials']} of {report['cycles']:g} cycles ({report['seconds']:.0f} s), "
-        f"speed noise {report['noise']:g}, pushes up to {report['push']:g} N, seed {report['seed']}",
+        f"speed noise {report['noise']:g}, pushes up to {report['push']:g} N, "
+        f"arms {report['arms']:g} rad, hands {report['hands']:g} N, seed {report['seed']}",
         f"survived  {report['survived']} of {report['trials']}, "
         f"{100.0 * report['lived']:.1f} % of the time lived",
         f"tracking  joints {shown('angle_error_deg', 'degrees')}, "
@@ -174,7 +155,7 @@ def _push_text(table: dict) -> list[str]:
         lines.append(f"{force:9} {cells}")
     lines.append(f"{'largest':>9} " + "".join(f"{table['largest'][d]:5.0f}" for d in table["directions"]))
     lines.append(
-        f"          {100.0 * ENOUGH:.0f} % survive {table['largest_in_every_direction']:g} N in every "
-        "direction (f forward, b back, l left, r right)"
+        f"          {100.0 * table['enough']:.0f} % survive {table['largest_in_every_direction']:g} N "
+        "in every direction (f forward, b back, l left, r right)"
     )
     return lines
