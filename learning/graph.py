@@ -88,7 +88,8 @@ def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph
     count = round(rows / STEPS)
     if count < SHORTEST:
         least = SHORTEST * STEPS * cycle.reference.timestep
-        raise ValueError(f"a cycle of {cycle.reference.duration:.2f} s is too short: give {least:.2f} s or more")
+        duration = cycle.reference.duration
+        raise ValueError(f"a cycle of {duration:.2f} s is too short: give {least:.2f} s or more")
     at = np.linspace(0.0, rows, count * STEPS + 1)
     fitted = Reference(resample_q(model, cycle.reference.joint_q, at), cycle.reference.timestep)
     several = Cycle(fitted, cycle.turn, cycle.travel).repeat(model, 3)

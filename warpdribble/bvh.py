@@ -112,9 +112,7 @@ def _parse(path: Path) -> pybvh.Bvh:
     except UnicodeDecodeError:
         raise ClipError(path, "not a BVH file (binary data)") from None
     except Exception as error:
-        reason = " ".join(
-            str(error).replace(f"in file {path}", "").replace(f"in {path}", "").split()
-        )
+        reason = " ".join(str(error).replace(f"in file {path}", "").replace(f"in {path}", "").split())
         raise ClipError(path, f"broken BVH: {reason or type(error).__name__}") from None
 
 

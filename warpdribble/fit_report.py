@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from .clips import SUFFIXES, read_clip
+from .report import check_page, write_measured
 from .sims.accuracy import LIMBS, accuracy
 from .sims.ball import inferred_ball
 from .sims.contact_score import score_contacts
 from .sims.retarget import retargeted
 
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 GOALS = {"mean": 4.0, "hands": 3.0, "slide": 5.0, "slide all": 5.0, "deep": 5.0}
 """[cm], [cm], [mm/s], [mm]."""
 
@@ -122,12 +122,9 @@ def _cell(row: dict, key: str) -> str:
 def main(folder: Path, page: Path) -> None:
     from .sims import Model
 
-    text = page.read_text(encoding="utf-8")
-    if BEGIN not in text or END not in text:
-        raise SystemExit(f"{page}: no markers '{BEGIN}' and '{END}'")
+    check_page(page)
     rows, scores = measure(Model.load("player"), folder, lambda line: print(line, flush=True))
-    head, rest = text.split(BEGIN)
-    page.write_text(f"{head}{BEGIN}\n\n{tables(rows, scores)}\n\n{END}{rest.split(END)[1]}", encoding="utf-8")
+    write_measured(page, tables(rows, scores))
 
 
 if __name__ == "__main__":

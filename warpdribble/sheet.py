@@ -64,9 +64,7 @@ def _draw_poses(axes, take: Take, frames, times) -> None:
     """Poses side by side, each seen from the same direction, far shapes first and paler."""
     turn = np.radians(VIEW)
     right = np.array([-np.sin(turn[0]), np.cos(turn[0]), 0.0])
-    toward = np.array(
-        [np.cos(turn[0]) * np.cos(turn[1]), np.sin(turn[0]) * np.cos(turn[1]), np.sin(turn[1])]
-    )
+    toward = np.array([np.cos(turn[0]) * np.cos(turn[1]), np.sin(turn[0]) * np.cos(turn[1]), np.sin(turn[1])])
     screen = np.stack([right, np.cross(toward, right), toward])
     axes.axhline(0.0, color="#b9a184", linewidth=1.2, zorder=0)
     for number, frame in enumerate(frames):
@@ -87,9 +85,7 @@ def _draw_poses(axes, take: Take, frames, times) -> None:
         axes.add_collection(
             PatchCollection(patches, facecolor=colours, edgecolor=INK, linewidth=0.35, zorder=2)
         )
-        axes.text(
-            number * SPACING, -0.28, f"{times[frame]:.2f} s", ha="center", fontsize=10, color=INK
-        )
+        axes.text(number * SPACING, -0.28, f"{times[frame]:.2f} s", ha="center", fontsize=10, color=INK)
     axes.set_xlim(-0.6 * SPACING, (len(frames) - 0.25) * SPACING)
     axes.set_ylim(-0.36, 1.9)
     axes.set_aspect("equal")

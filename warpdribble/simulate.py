@@ -218,9 +218,7 @@ def measure(model, reference: Reference, body_q, states, wall_time: float) -> Ru
     joints = [n for n in model.joint_names if pose.joint_body(model, n) in counted]
     apart = difference(model, reference.joint_q, states.astype(float))
     angles = [
-        np.linalg.norm(apart[:, model.dof_slice(n)], axis=-1)
-        for n in joints
-        if model.joint_type(n) != "free"
+        np.linalg.norm(apart[:, model.dof_slice(n)], axis=-1) for n in joints if model.joint_type(n) != "free"
     ]
     return Run(
         reference=reference,
