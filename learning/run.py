@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..assets import path as asset
 from .files import PART, read_arrays, said_if_damaged, whole, write_arrays
 from .graph import ControlGraph
 from .locomotion import WEIGHTS, CostWeights, Locomotion, locomotion_model
@@ -34,6 +35,7 @@ from .trials import States
 
 CONFIG, SKILL, GRAPH = "config.json", "skill.toml", "graph.npz"
 CHECKPOINT, POLICY = "checkpoint.npz", "policy.npz"
+CONTROLLERS = "controllers"
 FREE = ("version", "samcon.iterations")
 """Keys in which a run may differ from the one that it goes on from."""
 SECONDS = "seconds"
@@ -166,10 +168,16 @@ class Run:
 
     @staticmethod
     def load(folder: str | Path) -> Run:
-        """Read a run's folder. Raises ValueError, one line, for what is no run or has no policy yet."""
+        """Read a run's folder, or a shipped controller by name. Raises ValueError, one line, for what is no
+        run or has no policy yet."""
         folder = Path(folder)
+        if not folder.exists() and str(folder) in shipped_controllers():
+            folder = asset(CONTROLLERS) / folder
         if not folder.is_dir():
-            raise ValueError(f"{folder}: no such folder; warpdribble learn SKILL --out {folder} makes it")
+            known = ", ".join(shipped_controllers())
+            raise ValueError(
+                f"{folder}: no such folder; warpdribble learn SKILL --out {folder} makes it ({known} ships)"
+            )
         if not (folder / CONFIG).exists():
             raise ValueError(f"{folder} holds no run; give a folder that warpdribble learn wrote")
         config = _read_config(folder)
@@ -198,6 +206,11 @@ class Run:
     def task(self, worlds: int, device: str = "cpu") -> Locomotion:
         """Worlds in which the policy can be tried."""
         return Locomotion(locomotion_model(), self.graph, worlds, device, weights=self.weights)
+
+
+def shipped_controllers() -> list[str]:
+    """Names of the runs that come with warpdribble."""
+    return sorted(path.name for path in asset(CONTROLLERS).iterdir() if path.is_dir())
 
 
 def differences(there: dict, here: dict) -> list[str]:

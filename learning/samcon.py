@@ -93,6 +93,10 @@ class Walk:
     def __len__(self) -> int:
         return len(self.S)
 
+    def add(self, S, A, k, E, parent) -> None:
+        for rows, values in zip((self.S, self.A, self.k, self.E, self.parent), (S, A, k, E, parent)):
+            rows.append(values)
+
     def cut(self, row: int) -> None:
         """Forget everything from a row on."""
         for rows in (self.S, self.A, self.k, self.E, self.parent):
@@ -100,17 +104,39 @@ class Walk:
         self.states = [state for state in self.states if state[0] < row]
 
 
+class Trail:
+    """States of a walk to go back to."""
+
+    def __init__(self, task: Locomotion):
+        self._task, self._saved, self._back = task, [], BACK
+
+    def mark(self, row: int, k: np.ndarray, felt: np.ndarray) -> None:
+        """A fragment begins."""
+        self._back = max(self._back - 1, BACK)
+        if row % SAVE_EVERY == 0:
+            oldest = -(FARTHEST // SAVE_EVERY)
+            self._saved = [*self._saved[oldest:], (row, self._task.sim.snapshot(), k, felt)]
+
+    def retreat(self, row: int) -> tuple[int, np.ndarray, np.ndarray]:
+        """Go back from a row, farther each time in succession; row, k and what is felt there."""
+        while len(self._saved) > 1 and self._saved[-1][0] > row - self._back:
+            self._saved.pop()
+        self._back = min(2 * self._back, FARTHEST)
+        row, snapshot, k, felt = self._saved.pop()
+        self._task.sim.restore(snapshot)
+        return row, k, felt
+
+
 def walk(task: Locomotion, policy: LinearPolicy, config: SamconConfig, starts: States, random) -> Walk:
     """E-step: particles along a random walk, as many islands as have starts."""
-    n, islands = task.sim.world_count, len(starts)
-    k = np.repeat(starts.k, config.particles)
-    felt = task.reset(k, *(np.repeat(x, config.particles, axis=0) for x in (starts.joint_q, starts.joint_qd)))
-    disturber = Disturber(config.disturbance, task, random, group=config.particles)
-    seen, saved, back = Walk(), [], BACK
+    islands, particles = len(starts), config.particles
+    k = np.repeat(starts.k, particles)
+    felt = task.reset(k, *(np.repeat(x, particles, axis=0) for x in (starts.joint_q, starts.joint_qd)))
+    disturber = Disturber(config.disturbance, task, random, group=particles)
+    seen, trail = Walk(), Trail(task)
     while len(seen) < config.walk:
         row = len(seen)
-        if row % SAVE_EVERY == 0:
-            saved = [*saved[-FARTHEST // SAVE_EVERY :], (row, task.sim.snapshot(), k, felt)]
+        trail.mark(row, k, felt)
         disturber.apply()
         s = task.state(felt, k)
         a = policy.sample(s, k, random)
@@ -122,21 +148,15 @@ def walk(task: Locomotion, policy: LinearPolicy, config: SamconConfig, starts: S
             seen.retreats += 1
             if seen.retreats > RETRIES:
                 break
-            earlier = [state for state in saved if state[0] <= row - back] or saved[:1]
-            saved = saved[: len(saved) - saved[::-1].index(earlier[-1])]
-            row, snapshot, k, felt = saved.pop()
-            task.sim.restore(snapshot)
+            row, k, felt = trail.retreat(row)
             seen.cut(row)
-            back = min(2 * back, FARTHEST)
             continue
-        back = max(back - 1, BACK)
-        for rows, values in zip((seen.S, seen.A, seen.k, seen.E, seen.parent), (s, a, k, E, parent)):
-            rows.append(values)
+        seen.add(s, a, k, E, parent)
         task.sim.copy_worlds(parent)
         felt = felt[parent]
-        k = np.repeat(task.graph.follow(k[parent][:: config.particles], random), config.particles)
+        k = np.repeat(task.graph.follow(k[parent][::particles], random), particles)
         if row % SAVE_EVERY == SAVE_EVERY - 1:
-            best = np.arange(0, n, config.particles) + np.argmin(E[parent].reshape(islands, -1), axis=1)
+            best = np.arange(islands) * particles + np.argmin(E[parent].reshape(islands, -1), axis=1)
             seen.states.append((row, k[best], task.sim.joint_q[best], task.sim.joint_qd[best]))
     task.calm()
     seen.whole = len(seen) == config.walk

@@ -17,7 +17,7 @@ class Export:
     """Simulate a learned policy, nothing holding the root; write a USD take and pictures."""
 
     folder: Positional[Path]
-    """The run, a folder that warpdribble learn wrote."""
+    """The run, a folder that warpdribble learn wrote; or dribble-right-authored, which ships."""
     seconds: float = 20.0
     """How long, in whole fragments of 0.05 s."""
     push: float = 0.0

@@ -97,8 +97,10 @@ def _demo(command: Demo, model) -> int:
     say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle")
     _finish(command, model, reference, ball, "authored dribble")
     say(
-        "next      open the take in Blender (or any USD viewer), or let the player follow your own "
-        "clip:\n          warpdribble simulate CLIP.bvh --repeat 10"
+        "next      open the take in Blender (or any USD viewer); push a player that has learned to stand:\n"
+        "          warpdribble export dribble-right-authored --seconds 20 --push 300 --out out/pushed.usdc\n"
+        "          or let one follow your own clip, or learn it:\n"
+        "          warpdribble simulate CLIP.bvh --repeat 10, warpdribble learn SKILL --out RUN"
     )
     return 0
 
