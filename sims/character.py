@@ -40,7 +40,6 @@ class Character:
         self.sim, model = sim, sim.model
         self.ends = tuple(ends)
         self._program = kernels.program(sim.lanes, "character")
-        self._exchange = kernels.program(sim.lanes, "exchange")
         self._goals = [self._upload(table) for table in (goal_q, goal_qd)]
         self._who = self._make(model, judged)
         self.columns = 0

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed
-from .output import check_outputs, say_run, write_outputs
+from .output import Outputs, check_outputs, say_run, write_outputs
 
 
 @dataclass
-class Export:
+class Export(Outputs):
     """Simulate a learned policy, nothing holding the root; write a USD take and pictures."""
 
     folder: Positional[Path]
@@ -24,16 +23,6 @@ class Export:
     """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
     seed: int = 0
     """Of the start and the pushes."""
-    out: Path = Path("out/take.usdc")
-    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
-    skin: bool = False
-    """One smooth body over the player, in the take and the replay, instead of its shapes."""
-    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
-    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
-    html: bool = True
-    """Write the replay, a page for any browser, beside the take."""
-    device: str = "cpu"
-    """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
         from ..learning.disturbance import Disturbance

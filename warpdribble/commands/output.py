@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from .console import say
+
+
+@dataclass(kw_only=True)
+class Outputs:
+    """Options of every command that writes a take."""
+
+    out: Path = Path("out/take.usdc")
+    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
+    skin: bool = False
+    """One smooth body over the player, in the take and the replay, instead of its shapes."""
+    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
+    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
+    html: bool = True
+    """Write the replay, a page for any browser, beside the take."""
+    device: str = "cpu"
+    """Where to simulate: cpu, cuda:0, ..."""
 
 
 def check_outputs(out: Path) -> None:
@@ -16,12 +34,9 @@ def check_outputs(out: Path) -> None:
         check_writable(out.with_suffix(other), (".png", ".html"))
 
 
-def write_outputs(command, model, run, source: str, root: str) -> None:
-    """Write all of it and say where.
-
-    command: has out, skin, usd_joints and html; run: a `simulate.Run`; source: where the motion comes from;
-    root: what holds the root.
-    """
+def write_outputs(command: Outputs, model, run, source: str, root: str) -> None:
+    """Write all of it and say where. run: a `simulate.Run`; source: where the motion comes from; root: what
+    holds the root."""
     from .. import __version__
     from ..plots import write_plots
     from ..replay import write_replay

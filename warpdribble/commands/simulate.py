@@ -8,7 +8,7 @@ from typing import Literal
 
 from .clip_input import ClipInput
 from .console import bar, check_device, quiet_warp, ready, say
-from .output import check_outputs, say_run, write_outputs
+from .output import Outputs, check_outputs, say_run, write_outputs
 
 LONGEST = 600.0
 """[s] of one take."""
@@ -17,7 +17,7 @@ SHORT = 60.0
 
 
 @dataclass
-class Simulate(ClipInput):
+class Simulate(ClipInput, Outputs):
     """Let a simulated player follow a recorded clip or a skill; write a USD take and a picture.
 
     In place of a clip: the name of a skill (warpdribble skill list) or a skill's .toml file.
@@ -30,18 +30,8 @@ class Simulate(ClipInput):
     clip when empty."""
     root: Literal["free", "tracked"] = "free"
     """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too."""
-    out: Path = Path("out/take.usdc")
-    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
-    skin: bool = False
-    """One smooth body over the player, in the take and the replay, instead of its shapes."""
-    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
-    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
-    html: bool = True
-    """Write the replay, a page for any browser, beside the take."""
     model: str = "player"
     """The player, or the path of an MJCF file with the same body names."""
-    device: str = "cpu"
-    """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
         from ..sims import Model
@@ -51,7 +41,7 @@ class Simulate(ClipInput):
 
 
 @dataclass
-class Demo:
+class Demo(Outputs):
     """Simulate a dribble that comes with warpdribble; needs no data."""
 
     repeat: int = 5
@@ -60,14 +50,6 @@ class Demo:
     """free: only the joints are driven. tracked: virtual forces hold the pelvis too."""
     out: Path = Path("out/demo.usdc")
     """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
-    skin: bool = False
-    """One smooth body over the player, in the take and the replay, instead of its shapes."""
-    usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
-    """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
-    html: bool = True
-    """Write the replay, a page for any browser, beside the take."""
-    device: str = "cpu"
-    """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
         from ..sims import Model
