@@ -8,7 +8,7 @@ from warpdribble import kernels
 from warpdribble.sims import Model, Simulation
 
 
-@pytest.mark.parametrize("module", ["step", "observe"])
+@pytest.mark.parametrize("module", ["step", "observe", "exchange", "character"])
 def test_compiles_for_sm_90(module, tmp_path):
     wp.init()
     if not wp.is_cuda_available() and not nvrtc():

@@ -5,6 +5,7 @@ import pytest
 
 from warpdribble.sims import Model, Simulation
 from warpdribble.sims.batch import Batch, find_device
+from warpdribble.sims.character import Character
 
 
 def test_side_by_side_gives_the_same_bits(monkeypatch):
@@ -28,6 +29,28 @@ def test_side_by_side_gives_the_same_bits(monkeypatch):
     np.testing.assert_array_equal(rows.joint_qd, columns.joint_qd)
     np.testing.assert_array_equal(rows.contacts().impulse, columns.contacts().impulse)
     np.testing.assert_array_equal(rows.mass_matrix(), columns.mass_matrix())
+
+
+def test_a_character_side_by_side(monkeypatch):
+    model = Model.load("player", rigid=("*_mcp", "*_pip", "*_dip"), without=("ball",))
+    random = np.random.default_rng(0)
+    targets = np.tile(model.start_q, (12, 1))
+    offset = 0.2 * random.standard_normal((3, 4))
+    offset[:, 3] = np.abs(offset[:, 3])
+    seen = []
+    for columns in (False, True):
+        if columns:
+            flag = property(lambda self: True, lambda self, value: None)
+            monkeypatch.setattr(Batch, "_side_by_side", flag, False)
+        sim = Simulation(model, 3, lanes=1)
+        who = Character(
+            sim, targets, targets, np.zeros((12, model.nv)), ("l_foot",), ("neck",), ("l_hip", "r_knee")
+        )
+        who.step(5, [0, 3, 7], offset)
+        sim.copy_worlds([0, 0, 2])
+        who.step(5, [1, 2, 3], offset)
+        seen.append(np.concatenate([who.sense([0, 1, 2]), sim.joint_q, sim.joint_qd], axis=1))
+    np.testing.assert_array_equal(*seen)
 
 
 def test_unknown_device_names_those_there_are():
