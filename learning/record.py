@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from ..sims.reference import resample_q
 from ..sims.simulation import NONFINITE
-from .disturbance import CALM, Disturbance, Disturber
+from .disturbance import CALM, Disturbance
 from .graph import STEPS, ControlGraph
 from .locomotion import Locomotion
 from .policy import LinearPolicy
+from .steer import Steered
 from .trials import States, composed, planar, relative
 
 
@@ -47,24 +48,19 @@ def record(
     random = np.random.default_rng(seed)
     graph, sim, model = task.graph, task.sim, task.model
     start = states.draw(sim.world_count, random)
-    k = start.k
-    felt = task.reset(k, start.joint_q, start.joint_qd)
-    disturber = Disturber(disturbance, task, random)
+    task.reset(start.k, start.joint_q, start.joint_qd)
+    steered = Steered(task, policy, start.k, random, disturbance)
     joint_q, body_q, wanted = [sim.joint_q[0]], [sim.body_q[0]], []
     at, wall_time = planar(start.joint_q[:1]), 0.0
     for done in range(max(1, round(seconds / graph.period))):
-        disturber.apply()
-        task.offset[:, : task.actions] = policy.act(task.state(felt, k), k)
-        for step in range(STEPS):
+        for _ in range(STEPS):
             began = time.perf_counter()
-            task.character.step(1, k * STEPS + step, task.offset)
+            steered.step()
             wall_time += time.perf_counter() - began
             joint_q.append(sim.joint_q[0])
             body_q.append(sim.body_q[0])
-        felt = task.character.sense(k)
-        rows, at = _reference(model, graph, k[0], at)
+        rows, at = _reference(model, graph, steered.k[0], at)
         wanted.append(rows[:-1])
-        k = graph.follow(k, random)
         if progress:
             progress(done + 1)
     task.calm()

@@ -139,12 +139,14 @@ def simulate(
     root: Literal["free", "tracked"] = "free",
     ball: BallStart | None = None,
     progress: Callable[[int], None] | None = None,
+    step: Callable[[], None] | None = None,
 ) -> Run:
     """Track a reference in every world of `sim`; the run of the world whose ball stays in play
     longest.
 
     World 0 starts with the ball as given, the others with small, fixed variations of it. progress:
-    called with the number of steps done. Raises FloatingPointError when the state becomes
+    called with the number of steps done. step: advances all worlds by a time step, in place of
+    drives that just follow the reference. Raises FloatingPointError when the state becomes
     non-finite.
     """
     model = sim.model
@@ -164,8 +166,11 @@ def simulate(
     wall_time = 0.0
     for row in range(1, reference.frame_count):
         began = time.perf_counter()
-        sim.set_targets(targets[row])
-        sim.step(1)
+        if step:
+            step()
+        else:
+            sim.set_targets(targets[row])
+            sim.step(1)
         states[row] = sim.joint_q
         wall_time += time.perf_counter() - began
         body_q[row] = sim.body_q

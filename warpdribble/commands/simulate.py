@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Literal
 
 from .clip_input import ClipInput
-from .console import bar, check_device, quiet_warp, ready, say
+from .console import bar, check_device, check_range, compiling, quiet_warp, ready, say, warmed
 from .output import Outputs, check_outputs, say_run, write_outputs
 
 LONGEST = 600.0
 """[s] of one take."""
 SHORT = 60.0
 """[s] up to which several starts of the ball are tried: all of them are kept in memory."""
+
+LEARNED = "dribble-right-authored"
+"""The shipped controller of the demo."""
 
 
 @dataclass
@@ -42,12 +45,12 @@ class Simulate(ClipInput, Outputs):
 
 @dataclass
 class Demo(Outputs):
-    """Simulate a dribble that comes with warpdribble; needs no data."""
+    """A player that has learned to stand dribbles, on its own feet; needs no data."""
 
     repeat: int = 5
     """How many dribbles."""
-    root: Literal["free", "tracked"] = "free"
-    """free: only the joints are driven. tracked: virtual forces hold the pelvis too."""
+    push: float = 0.0
+    """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
     out: Path = Path("out/demo.usdc")
     """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
 
@@ -55,6 +58,7 @@ class Demo(Outputs):
         from ..sims import Model
 
         _check(self)
+        check_range("--push", self.push, 0.0, 1e4)
         return _demo(self, Model.load("player"))
 
 
@@ -68,21 +72,33 @@ def _check(command: Simulate | Demo) -> None:
 
 
 def _demo(command: Demo, model) -> int:
+    import numpy as np
+
     from ..author import dribble_right
+    from ..learning.disturbance import Disturbance
+    from ..learning.graph import cyclic_graph
+    from ..learning.locomotion import Locomotion
+    from ..learning.run import Run
+    from ..learning.steer import Steered
     from ..sims.reference import Cycle
-    from ..simulate import ball_in_reference
+    from ..simulate import TRIES, ball_in_reference
 
     clip = dribble_right(model)
     _check_length(clip.reference, command.repeat)
-    reference = Cycle(clip.reference).repeat(model, command.repeat)
+    cycle = Cycle(clip.reference)
+    reference = cycle.repeat(model, command.repeat)
     ball = ball_in_reference(model, reference)
-    say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle")
-    _finish(command, model, reference, ball, "authored dribble")
+    say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle, legs learned")
+    with compiling():
+        task = warmed(Locomotion(model, cyclic_graph(model, cycle), TRIES, command.device))
+    start, random = np.zeros(TRIES, int), np.random.default_rng(0)
+    pushed = Disturbance(push=command.push)
+    legs = Steered(task, Run.load(LEARNED).policy, start, random, pushed)
+    _finish(command, task.sim, reference, ball, "authored dribble", "free", legs.step)
     say(
-        "next      open the take in Blender (or any USD viewer); push a player that has learned to stand:\n"
-        "          warpdribble export dribble-right-authored --seconds 20 --push 300 --out out/pushed.usdc\n"
-        "          or let one follow your own clip, or learn it:\n"
-        "          warpdribble simulate CLIP.bvh --repeat 10, warpdribble learn SKILL --out RUN"
+        "next      open the take in Blender (or any USD viewer); push: warpdribble demo --push 300;\n"
+        "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"
+        "          or learn one, warpdribble learn SKILL --out RUN"
     )
     return 0
 
@@ -108,7 +124,8 @@ def _simulate(command: Simulate, model) -> int:
     ball = None
     if "ball" in model.body_names:
         ball = ball_from_hand(model, reference, dribbling_hand(model, reference))
-    _finish(command, model, reference, ball, f"{command.clip.name}, {part}")
+    sim = _sim(command, model, reference, ball)
+    _finish(command, sim, reference, ball, f"{command.clip.name}, {part}", command.root)
     return 0
 
 
@@ -129,7 +146,8 @@ def _simulate_skill(command: Simulate, model) -> int:
         reference = one.cycle.repeat(model, command.repeat)
     has_ball = one.ball is not None and "ball" in model.body_names
     ball = ball_in_reference(model, reference) if has_ball else None
-    _finish(command, model, reference, ball, f"skill {one.skill.name}")
+    sim = _sim(command, model, reference, ball)
+    _finish(command, sim, reference, ball, f"skill {one.skill.name}", command.root)
     return 0
 
 
@@ -140,13 +158,19 @@ def _check_length(reference, repeat: int) -> None:
         raise ValueError(f"--repeat {repeat}: at most {most} for this clip ({LONGEST:.0f} s)")
 
 
-def _finish(command: Simulate | Demo, model, reference, ball, source: str) -> None:
+def _finish(command: Outputs, sim, reference, ball, source: str, root: str, step=None) -> None:
     """Simulate, say how it went, and write the take and its picture."""
-    from ..simulate import TRIES, simulate
+    from ..simulate import simulate
+
+    with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
+        run = simulate(sim, reference, root, ball, progress, step)
+    say_run(run, root)
+    write_outputs(command, sim.model, run, source, root)
+
+
+def _sim(command: Simulate, model, reference, ball):
+    """Worlds enough for the starts that are tried."""
+    from ..simulate import TRIES
 
     tries = TRIES if ball is not None and reference.duration < SHORT else 1
-    sim = ready(model, tries, command.device)
-    with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
-        run = simulate(sim, reference, command.root, ball, progress)
-    say_run(run, command.root)
-    write_outputs(command, model, run, source, command.root)
+    return ready(model, tries, command.device)
