@@ -184,13 +184,17 @@ class Batch:
         if values.ndim:
             values = values.reshape(-1, n, parts)
         values = np.broadcast_to(values, (len(worlds), n, parts))
-        last = np.flatnonzero(worlds == self.world_count - 1)
-        if len(last):
-            spare = np.arange(self.world_count, self.groups * self.lanes)
-            worlds = np.concatenate([worlds, spare])
-            values = np.concatenate([values, np.repeat(values[last[-1:]], len(spare), 0)])
-        group, lane = np.divmod(worlds, self.lanes)
-        part[group, :, :, lane] = values
+        count = self.groups * self.lanes
+        if len(worlds) == count and (worlds == np.arange(count)).all():  # all of them: no look-ups
+            part[:] = values.reshape(self.groups, self.lanes, n, parts).transpose(0, 2, 3, 1)
+        else:
+            last = np.flatnonzero(worlds == self.world_count - 1)
+            if len(last):
+                spare = np.arange(self.world_count, count)
+                worlds = np.concatenate([worlds, spare])
+                values = np.concatenate([values, np.repeat(values[last[-1:]], len(spare), 0)])
+            group, lane = np.divmod(worlds, self.lanes)
+            part[group, :, :, lane] = values
         if self._side_by_side:
             structured = hasattr(array.dtype, "numpy_dtype")
             dtype = array.dtype.numpy_dtype() if structured else np.float32
