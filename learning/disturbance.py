@@ -68,7 +68,7 @@ class Disturber:
                 self._force(name, self._hands[:, hand])
         if what.arms:
             arms = what.arms * self.random.standard_normal((n, task.arm_columns))
-            task.offset[:, task.actions :] = np.repeat(arms, self.group, axis=0)
+            task.offset[:, task.action_size :] = np.repeat(arms, self.group, axis=0)
 
     def _force(self, body: str, force: np.ndarray) -> None:
         self.task.sim.apply_force(body, np.repeat(force, self.group, axis=0))

@@ -35,7 +35,7 @@ def said_if_damaged(path: Path, remedy: str):
     """Turn whatever reading a damaged file raises into a ValueError of one line with the remedy."""
     try:
         yield
-    except FileNotFoundError:
+    except (FileNotFoundError, PermissionError):
         raise
     except (
         zipfile.BadZipFile,

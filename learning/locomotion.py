@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
 from ..sims import Model, Simulation
 from ..sims.character import (
@@ -24,6 +25,7 @@ from ..sims.character import (
 from ..sims.simulation import FALL, NONFINITE
 from .disturbance import HANDS, PUSHED
 from .graph import STEPS, ControlGraph
+from .policy import LinearPolicy
 
 FINGERS = ("*_mcp", "*_pip", "*_dip")
 STEERED = ("lower_back", "l_hip", "r_hip", "l_knee", "r_knee")
@@ -90,8 +92,8 @@ class Locomotion:
         self.character = Character(
             self.sim, graph.targets, graph.goal_q, graph.goal_qd, FELT, JUDGED, STEERED + ARMS
         )
-        self.actions = sum(dof.stop - dof.start for dof in map(model.dof_slice, STEERED))
-        self.arm_columns = self.character.columns - self.actions
+        self.action_size = sum(dof.stop - dof.start for dof in map(model.dof_slice, STEERED))
+        self.arm_columns = self.character.columns - self.action_size
         self.offset = np.zeros((world_count, self.character.columns), np.float32)
         self.scale = np.concatenate([np.full(part.stop - part.start, unit) for part, unit in STATE])
         self.start = self._reference(graph.start_q, graph.start_qd)
@@ -99,10 +101,9 @@ class Locomotion:
         self.samples = 0
         self.simulating = 0.0
 
-    @property
-    def states(self) -> int:
-        """Numbers of the reduced state."""
-        return len(self.scale)
+    def open_loop(self, sigma: float = 0.0) -> LinearPolicy:
+        """The policy that changes nothing, whatever the state; sigma: exploration about it [rad]."""
+        return LinearPolicy.zero(self.graph.count, self.action_size, len(self.scale), sigma)
 
     def _reference(self, joint_q, joint_qd) -> np.ndarray:
         """What the character feels in given states."""
@@ -122,7 +123,7 @@ class Locomotion:
 
     def calm(self) -> None:
         """End all disturbances."""
-        self.offset[:, self.actions :] = 0.0
+        self.offset[:, self.action_size :] = 0.0
         if self.sim.forced:
             for body in (PUSHED, *HANDS):
                 self.sim.apply_force(body, np.zeros(3))
@@ -137,8 +138,9 @@ class Locomotion:
         """Simulate fragments k (world_count,) under actions (world_count, actions) [rad]; what is felt at
         their end."""
         began = time.perf_counter()
-        self.offset[:, : self.actions] = action
+        self.offset[:, : self.action_size] = action
         self.character.step(STEPS, k * STEPS, self.offset)
+        wp.synchronize_device(self.sim.device)
         self.simulating += time.perf_counter() - began
         self.samples += len(self.offset)
         return self.character.sense(k)

@@ -30,7 +30,11 @@ class LinearPolicy:
 
     def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
         """Actions (n, actions) [rad] for states s (n, states) at the start of fragments k (n,)."""
-        return np.einsum("nij,nj->ni", self.M[k], s) + self.a_hat[k]
+        a = self.a_hat[k]
+        for i in np.unique(k):
+            rows = k == i
+            a[rows] += s[rows] @ self.M[i].T
+        return a
 
     def sample(self, s: np.ndarray, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
         """Actions with exploration noise."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .disturbance import PUSHED as BODY
+from .disturbance import PUSHED
 from .locomotion import Locomotion
 from .policy import LinearPolicy
 from .trials import States, planar
@@ -27,7 +27,7 @@ PUSH_TIME = 0.2
 """[s]"""
 SETTLE, AFTER = 1.0, 4.0
 """[s] before a push, and within which a fall is put down to it."""
-PUSHED = 64 * len(DIRECTIONS)
+PLAYERS = 64 * len(DIRECTIONS)
 """Players pushed for a row of the table."""
 FORCES = tuple(range(50, 1001, 50))
 """[N] tried in turn, until all directions are lost."""
@@ -89,9 +89,10 @@ def push_survival(
     for row in range(begins.max() + lasts + after):
         facing = planar(task.sim.joint_q)[:, 2] + which * 2.0 * np.pi / len(DIRECTIONS)
         new = row == begins
-        applied[new] = force * np.stack([np.cos(facing), np.sin(facing), 0.0 * facing], axis=1)[new]
+        whom = new & ~fell
+        applied[whom] = force * np.stack([np.cos(facing), np.sin(facing), 0.0 * facing], axis=1)[whom]
         applied[row == begins + lasts] = 0.0
-        task.sim.apply_force(BODY, applied)
+        task.sim.apply_force(PUSHED, applied)
         before |= fell & new
         felt = task.advance(k, policy.act(task.state(felt, k), k))
         fell |= task.fallen(felt, k) & (row < begins + lasts + after)

@@ -56,8 +56,8 @@ def record(
         for _ in range(STEPS):
             began = time.perf_counter()
             steered.step()
-            wall_time += time.perf_counter() - began
             joint_q.append(sim.joint_q[0])
+            wall_time += time.perf_counter() - began
             body_q.append(sim.body_q[0])
         rows, at = _reference(model, graph, steered.k[0], at)
         wanted.append(rows[:-1])

@@ -3,7 +3,7 @@
     config.json      what makes the run the one it is
     skill.toml       the skill, as it was given
     graph.npz        its control graph; the clip is not needed any more
-    checkpoint.npz   `Samcon.state` after the last iteration
+    checkpoint.npz   `Samcon.saved` after the last iteration
     policy.npz       the best policy so far, and states to start it from
     progress.csv     a row per iteration, and the same in tensorboard/
 
@@ -112,7 +112,7 @@ class RunFolder:
             state = read_arrays(path, remedy)
             with said_if_damaged(path, remedy):
                 self._seconds = float(state.pop(SECONDS))
-                for name, array in samcon.state.items():
+                for name, array in samcon.saved.items():
                     if "states." not in name and state[name].shape != array.shape:
                         raise ValueError(f"{name} has the shape {state[name].shape}")
                 samcon.resume(state)
@@ -133,7 +133,7 @@ class RunFolder:
                 if np.isfinite(report.survived):
                     self._write_policy(samcon)
                 seconds = np.array(self._seconds)
-                write_arrays(self.folder / CHECKPOINT, samcon.state | {SECONDS: seconds})
+                write_arrays(self.folder / CHECKPOINT, samcon.saved | {SECONDS: seconds})
                 self.saved = samcon.iteration
                 if progress:
                     progress(report)

@@ -11,6 +11,7 @@ taken in.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -108,17 +109,19 @@ class Trail:
     """States of a walk to go back to."""
 
     def __init__(self, task: Locomotion):
-        self._task, self._saved, self._back = task, [], BACK
+        self._task, self._saved, self._back, self._failed = task, [], BACK, 0
 
     def mark(self, row: int, k: np.ndarray, felt: np.ndarray) -> None:
         """A fragment begins."""
-        self._back = max(self._back - 1, BACK)
+        if row > self._failed:
+            self._back = BACK
         if row % SAVE_EVERY == 0:
             oldest = -(FARTHEST // SAVE_EVERY)
             self._saved = [*self._saved[oldest:], (row, self._task.sim.snapshot(), k, felt)]
 
     def retreat(self, row: int) -> tuple[int, np.ndarray, np.ndarray]:
-        """Go back from a row, farther each time in succession; row, k and what is felt there."""
+        """Go back from a row, farther each time until it has been passed; row, k and what is felt there."""
+        self._failed = max(self._failed, row)
         while len(self._saved) > 1 and self._saved[-1][0] > row - self._back:
             self._saved.pop()
         self._back = min(2 * self._back, FARTHEST)
@@ -165,8 +168,8 @@ def walk(task: Locomotion, policy: LinearPolicy, config: SamconConfig, starts: S
 
 def select(E: np.ndarray, keep: float, random) -> tuple[np.ndarray, int]:
     """The particle (n,) whose copy each one becomes, and how many islands have none left; E: costs (islands,
-    particles). The best `keep` of an island stay and have equally many children; an island without
-    survivors becomes like another one."""
+    particles). The best `keep` of an island stay; the others become copies of them, of the best first; an
+    island without survivors becomes like another one."""
     islands, particles = E.shape
     order = np.argsort(E, axis=1, kind="stable")
     alive = np.minimum(np.isfinite(E).sum(axis=1), max(1, round(keep * particles)))
@@ -248,7 +251,7 @@ class Progress:
 
 
 class Samcon:
-    """Learns a policy for a task; everything that its future depends on is in `state`."""
+    """Learns a policy for a task; everything that its future depends on is in `saved`."""
 
     def __init__(self, task: Locomotion, trial_task: Locomotion, config: SamconConfig, seed: int = 0):
         if task.sim.world_count != config.islands * config.particles:
@@ -257,7 +260,7 @@ class Samcon:
             )
         self.task, self.trial_task, self.config, self.seed = task, trial_task, config, seed
         self.random = np.random.default_rng(seed)
-        self.policy = LinearPolicy.zero(task.graph.count, task.actions, task.states, config.sigma)
+        self.policy = task.open_loop(config.sigma)
         self.mean = self.policy.copy()
         self.best = self.policy.copy()
         self.best_score = -np.inf
@@ -322,7 +325,7 @@ class Samcon:
                 speed_noise=self.config.speed_noise,
                 disturbance=self.config.disturbance,
             )
-            score = trials.lived.mean() - 0.01 * np.nan_to_num(trials.cost)
+            score = trials.lived.mean() - 0.01 * trials.cost if trials.lived.any() else -1.0
             survived = float(trials.survived.mean())
             if score > self.best_score:
                 self.best, self.best_score = policy.copy(), score
@@ -339,10 +342,8 @@ class Samcon:
         return self.best
 
     @property
-    def state(self) -> dict[str, np.ndarray]:
+    def saved(self) -> dict[str, np.ndarray]:
         """Arrays by name, from which `resume` goes on exactly as this object would."""
-        import json
-
         policies = {"policy": self.policy, "mean": self.mean, "best": self.best}
         arrays = {f"{name}.{x}": v for name, p in policies.items() for x, v in vars(p).items()}
         states = {"states": self.states, "best_states": self.best_states}
@@ -355,9 +356,7 @@ class Samcon:
         }
 
     def resume(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from a `state`."""
-        import json
-
+        """Go on from what was `saved`."""
         for name in ("policy", "mean", "best"):
             setattr(self, name, LinearPolicy(*(state[f"{name}.{x}"] for x in ("M", "a_hat", "sigma"))))
         for name in ("states", "best_states"):

@@ -30,6 +30,6 @@ class Steered:
         if self._done == 0:
             self._disturber.apply()
             state = task.state(task.character.sense(self.k), self.k)
-            task.offset[:, : task.actions] = self.policy.act(state, self.k)
+            task.offset[:, : task.action_size] = self.policy.act(state, self.k)
         task.character.step(1, self.k * STEPS + self._done, task.offset)
         self._done += 1

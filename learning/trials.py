@@ -111,7 +111,7 @@ def run_trials(
     k, fragments = start.k, max(1, round(cycles * graph.count))
     felt = task.reset(k, start.joint_q, start.joint_qd)
     disturber = Disturber(disturbance, task, random)
-    stands, life, cost = np.ones(n, bool), np.zeros(n), []
+    stands, life, cost = np.ones(n, bool), np.zeros(n), 0.0
     errors = Errors(task, start)
     for done in range(fragments):
         disturber.apply()
@@ -121,13 +121,15 @@ def run_trials(
         if not stands.any():
             break
         life += stands
-        cost.append(E[stands].mean())
+        cost += E[stands].sum()
         errors.add(felt, k, stands)
         k = graph.follow(k, random)
         if progress:
             progress(done + 1)
     task.calm()
-    return Trials(stands, life / fragments, float(np.mean(cost)) if cost else np.nan, *errors.means())
+    return Trials(
+        stands, life / fragments, float(cost / life.sum()) if life.any() else np.nan, *errors.means()
+    )
 
 
 class Errors:

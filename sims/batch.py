@@ -134,6 +134,7 @@ class Batch:
         for (name, (_, dtype)), (start, count, *_) in zip(arrays.items(), blocks):
             shape = (count, groups) if self._side_by_side else (groups, count)
             array = wp.array(ptr=self._carried.ptr + 4 * start, dtype=dtype, shape=shape, device=self.device)
+            array._ref = self._carried  # as Warp's own views keep what they show
             setattr(world, name, array.transpose() if self._side_by_side else array)
         block = self._exchange.Block
         table = np.array(blocks, np.int32).view(block.numpy_dtype()).ravel()
@@ -176,39 +177,44 @@ class Batch:
         """Set a state array of some worlds, or one column of it: `values` `(..., n * parts)`, for each
         world or for all. The unused worlds of the last group follow the last world."""
         array = getattr(self._world, name)
-        rows = self._rows(array)
-        columns = slice(None) if column is None else slice(column, column + 1)
-        part = rows[:, columns]
-        n, parts = part.shape[1:3]
+        if column is not None:
+            array = array[:, column : column + 1]
+        n, parts = array.shape[1], wp.types.type_size_in_bytes(array.dtype) // (4 * self.lanes)
         values = np.asarray(values, np.float32)
         if values.ndim:
             values = values.reshape(-1, n, parts)
         values = np.broadcast_to(values, (len(worlds), n, parts))
         count = self.groups * self.lanes
-        if len(worlds) == count and (worlds == np.arange(count)).all():  # all of them: no look-ups
-            part[:] = values.reshape(self.groups, self.lanes, n, parts).transpose(0, 2, 3, 1)
+        if len(worlds) == count and (worlds == np.arange(count)).all():  # all of them: the old do not count
+            rows = values.reshape(self.groups, self.lanes, n, parts).transpose(0, 2, 3, 1)
         else:
+            rows = self._rows(array)
             last = np.flatnonzero(worlds == self.world_count - 1)
             if len(last):
                 spare = np.arange(self.world_count, count)
                 worlds = np.concatenate([worlds, spare])
                 values = np.concatenate([values, np.repeat(values[last[-1:]], len(spare), 0)])
             group, lane = np.divmod(worlds, self.lanes)
-            part[group, :, :, lane] = values
-        if self._side_by_side:
-            structured = hasattr(array.dtype, "numpy_dtype")
-            dtype = array.dtype.numpy_dtype() if structured else np.float32
-            array.assign(rows.reshape(-1).view(dtype).reshape(array.shape))
+            rows[group, :, :, lane] = values
+        self._assign(array, rows)
+
+    def _assign(self, array: wp.array, rows: np.ndarray) -> None:
+        """Set an array to float32 `(groups, n, parts, lanes)`, as `_rows` gives them."""
+        if not self._side_by_side:
+            there = self._rows(array)
+            if not np.shares_memory(there, rows):
+                there[:] = rows
+            return
+        structured = hasattr(array.dtype, "numpy_dtype")
+        dtype = array.dtype.numpy_dtype() if structured else np.float32
+        array.assign(np.ascontiguousarray(rows).reshape(-1).view(dtype).reshape(array.shape))
 
     def _fill(self, array: wp.array, values: np.ndarray) -> None:
         """Set an array `(groups, n)` of Reals from `values` (world_count, n)."""
         spare = self.groups * self.lanes - self.world_count
         values = np.pad(np.asarray(values, np.float32), ((0, spare), (0, 0)), mode="edge")
         values = values.reshape(self.groups, self.lanes, -1).transpose(0, 2, 1)
-        if self._side_by_side:
-            array.assign(np.ascontiguousarray(values[..., 0]))
-        else:
-            self._rows(array)[:, :, 0] = values
+        self._assign(array, values[:, :, None])
 
     def _worlds(self, worlds) -> np.ndarray:
         if worlds is None:

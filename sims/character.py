@@ -38,6 +38,11 @@ class Character:
 
     def __init__(self, sim, targets, goal_q, goal_qd, ends, judged, steered):
         self.sim, model = sim, sim.model
+        for name in (*judged, *steered):
+            if model.joint_type(name) == "free":
+                raise ValueError(f"joint '{name}' is free: it has no goal and no drive here")
+        if not steered:
+            raise ValueError("name the joints to be steered")
         self.ends = tuple(ends)
         self._program = kernels.program(sim.lanes, "character")
         self._goals = [self._upload(table) for table in (goal_q, goal_qd)]
@@ -73,7 +78,9 @@ class Character:
             setattr(who, name, wp.array(values.astype(np.int32), dtype=int, device=self.sim.device))
         places = []
         for name in self.ends:
-            shape = next(s for s in model.shapes if s.body == model.body(name))
+            shape = next((s for s in model.shapes if s.body == model.body(name)), None)
+            if shape is None:
+                raise ValueError(f"body '{name}' has no shape, so no end to be felt")
             at = pose.Rotation.from_quat(t["body_turn"][model.body(name)]).apply(shape.pos)
             places.append(t["body_offset"][model.body(name)] + at)
         who.end_point = wp.array(np.array(places, np.float32), dtype=wp.vec3, device=self.sim.device)

@@ -113,6 +113,4 @@ def _ground_forces(model, body_q, com, push, feet):
     off = point - sum(s[:, None] * m for s, m in zip(share, middles))
     off *= np.minimum(1.0, LEVER / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-9))
     loaded = force * (force[:, 2:] > 0.0)
-    return {
-        foot: (middle + off, s[:, None] * loaded) for foot, middle, s in zip(feet, middles, share)
-    }
+    return {foot: (middle + off, s[:, None] * loaded) for foot, middle, s in zip(feet, middles, share)}

@@ -87,9 +87,7 @@ class Motion:
     def slice(self, first: int, last: int) -> Motion:
         """Frames first..last, both included. Raises ValueError when they are not in the motion."""
         if not 0 <= first < last < self.frame_count:
-            raise ValueError(
-                f"frames {first} to {last} are not a range within 0 to {self.frame_count - 1}"
-            )
+            raise ValueError(f"frames {first} to {last} are not a range within 0 to {self.frame_count - 1}")
         part = slice(first, last + 1)
         return replace(
             self,
@@ -130,9 +128,7 @@ class Motion:
 
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """Forward kinematics of the rest pose, root at the origin: (joints, 3) [m], (joints, 4)."""
-        positions, frames = _forward(
-            self.parents, self.offsets, self.rest_rotations[None], np.zeros((1, 3))
-        )
+        positions, frames = _forward(self.parents, self.offsets, self.rest_rotations[None], np.zeros((1, 3)))
         return positions[0], frames[0]
 
 

@@ -255,10 +255,10 @@ class Simulation(Batch):
 
     def copy_contact_history(self, other: Simulation) -> None:
         """Take over another simulation's impulses of the last step, from which a solve starts."""
-        impulse = other._rows(other._world.impulse)[: self.groups]
-        if other.model is not self.model or other.lanes != self.lanes:
-            raise ValueError("the other simulation must have the same model and lanes")
-        self._rows(self._world.impulse)[:] = impulse
+        same = (other.model is self.model, other.lanes == self.lanes, other.world_count == self.world_count)
+        if not all(same):
+            raise ValueError("the other simulation must have the same model, lanes and world_count")
+        wp.copy(self._world.impulse, other._world.impulse)
 
     def contact_residual(self) -> np.ndarray:
         """(world_count,) largest velocity [m/s] by which a contact of the last step misses its law"""

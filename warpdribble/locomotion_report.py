@@ -17,8 +17,7 @@ import numpy as np
 
 from .learning.disturbance import CALM, Disturbance
 from .learning.log import read_rows
-from .learning.policy import LinearPolicy
-from .learning.pushes import DIRECTIONS, PUSHED, push_table
+from .learning.pushes import DIRECTIONS, PLAYERS, push_table
 from .learning.run import CONFIG, Run
 from .learning.trials import run_trials
 from .report import check_page, write_measured
@@ -37,13 +36,13 @@ def measure(folder: Path) -> dict:
     if kept.exists() and json.loads(kept.read_text())["iterations"] == run.iteration:
         return json.loads(kept.read_text())
     task = run.task(TRIALS)
-    blind = LinearPolicy.zero(run.graph.count, task.actions, task.states)
+    blind = task.open_loop()
 
     def tried(policy, cycles, disturbance=CALM):
         return run_trials(task, policy, run.states, cycles, 1, NOISE, disturbance)
 
     calm, busy, still = tried(run.policy, CYCLES), tried(run.policy, CYCLES, BUSY), tried(blind, 5)
-    pushes = push_table(run.task(PUSHED), run.policy, run.states, seed=1)
+    pushes = push_table(run.task(PLAYERS), run.policy, run.states, seed=1)
     found = {
         "skill": run.config["skill"]["name"],
         "description": run.config["skill"]["description"],

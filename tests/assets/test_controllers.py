@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from warpdribble.learning.disturbance import Disturbance
-from warpdribble.learning.policy import LinearPolicy
 from warpdribble.learning.pushes import push_survival
 from warpdribble.learning.run import Run, shipped_controllers
 from warpdribble.learning.trials import run_trials
@@ -18,7 +17,7 @@ def test_it_stands_where_the_open_loop_falls(name):
     pushed = Disturbance(push=150.0, push_every=2.0, arms=0.2, hands=18.0)
     trials = run_trials(task, run.policy, run.states, 20, 3, 0.15, pushed)
     assert trials.survived.all()
-    blind = LinearPolicy.zero(run.graph.count, task.actions, task.states)
+    blind = task.open_loop()
     assert run_trials(task, blind, run.states, 20, 3, 0.15, pushed).survived.mean() < 0.5
 
 

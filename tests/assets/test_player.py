@@ -220,8 +220,7 @@ def test_ankles_carry_the_stand(model):
 
 def test_collisions_are_with_the_ground_and_the_ball_only(model):
     touch = lambda a, b: bool(  # noqa: E731
-        model.geom(a).contype & model.geom(b).conaffinity
-        or model.geom(b).contype & model.geom(a).conaffinity
+        model.geom(a).contype & model.geom(b).conaffinity or model.geom(b).contype & model.geom(a).conaffinity
     )
     geoms = player_geoms(model)
     assert all(touch("ground", g) and touch("ball", g) for g in geoms)

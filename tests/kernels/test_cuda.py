@@ -36,3 +36,27 @@ def test_cuda_agrees_with_cpu():
         assert (sim.status == 0).all()
         out.append(sim.joint_q.copy())
     np.testing.assert_allclose(out[1], out[0], atol=1e-4)
+
+
+@pytest.mark.gpu
+def test_a_walk_on_cuda_agrees_with_the_cpu():
+    """A shipped policy over ten fragments, worlds copied in between: targets along tables, what is felt, and
+    the copies, on both devices."""
+    from warpdribble.learning.run import Run
+
+    run = Run.load("dribble-right-authored")
+    felt = []
+    for device in ("cpu", "cuda"):
+        task = run.task(12, device)
+        k = np.arange(12)
+        seen = task.reset(k, run.graph.start_q[k], run.graph.start_qd[k])
+        task.sim.apply_force("torso", [20.0, 0.0, 0.0], worlds=[3, 5])
+        for row in range(10):
+            seen = task.advance(k, run.policy.act(task.state(seen, k), k))
+            if row == 4:
+                sources = np.array([0, 0, 2, 3, 3, 5, 6, 7, 8, 9, 11, 10])
+                task.sim.copy_worlds(sources)
+                seen, k = seen[sources], k[sources]
+            k = task.graph.follow(k, np.random.default_rng(0))
+        felt.append(seen)
+    np.testing.assert_allclose(felt[1], felt[0], atol=1e-2, rtol=1e-2)

@@ -107,9 +107,7 @@ def test_effort_limits():
     for _ in range(2):
         sim.step()
         after = sim.joint_qd.astype(float)
-        held = [
-            robot.obeys_effort_limits(q[k], v[k], after[k], target[k], h, drives) for k in range(WORLDS)
-        ]
+        held = [robot.obeys_effort_limits(q[k], v[k], after[k], target[k], h, drives) for k in range(WORLDS)]
         good, full = np.moveaxis(np.array(held), 1, 0)
         print(f"{100 * full.mean():.1f} % of drives at their limit, {100 * (~good).mean():.2f} % wrong")
         assert 0.02 <= full.mean() <= 0.5

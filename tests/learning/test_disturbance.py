@@ -18,7 +18,7 @@ class Notes:
     def __init__(self, worlds=WORLDS, period=PERIOD):
         self.graph = SimpleNamespace(period=period)
         self.sim = SimpleNamespace(world_count=worlds, apply_force=self._apply)
-        self.actions, self.arm_columns = ACTIONS, ARMS
+        self.action_size, self.arm_columns = ACTIONS, ARMS
         self.offset = np.zeros((worlds, ACTIONS + ARMS), np.float32)
         self.force = {name: np.zeros((worlds, 3)) for name in (PUSHED, *HANDS)}
         self.calmed = 0
@@ -136,7 +136,7 @@ def go(worlds, graph, fragments=6):
     k = np.zeros(worlds.sim.world_count, int)
     worlds.reset(k, graph.start_q[k], graph.start_qd[k])
     for _ in range(fragments):
-        worlds.advance(k, np.zeros((len(k), worlds.actions)))
+        worlds.advance(k, np.zeros((len(k), worlds.action_size)))
         k = (k + 1) % graph.count
     return worlds.sim.joint_q
 
@@ -157,7 +157,7 @@ def test_calm_ends_everything(task, graph):
         end()
         assert (
             not worlds.sim._read(worlds.sim._world.force).any()
-            and not worlds.offset[:, worlds.actions :].any()
+            and not worlds.offset[:, worlds.action_size :].any()
         )
         np.testing.assert_array_equal(go(worlds, graph), quiet)
 
@@ -167,7 +167,7 @@ def test_arm_offsets_reach_arms_and_no_other_joint(task, graph, player):
     Disturber(Disturbance(arms=0.3), worlds, np.random.default_rng(1)).apply()
     k = np.zeros(5, int)
     worlds.reset(k, graph.start_q[k], graph.start_qd[k])
-    worlds.advance(k, np.zeros((5, worlds.actions)))
+    worlds.advance(k, np.zeros((5, worlds.action_size)))
     target = worlds.sim._read(worlds.sim._world.target)
     moved = np.flatnonzero((np.abs(target - graph.targets[4]) > 1e-6).all(axis=0))
     names = {name for name in player.joint_names if set(np.r_[player.q_slice(name)]) & set(moved)}

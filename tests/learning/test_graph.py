@@ -250,7 +250,7 @@ def test_joined_graphs_are_walked_in_the_simulation(player, graph, curve, task):
     k = np.array([0, graph.count, 3, graph.count + 3])
     felt = worlds.reset(k, both.start_q[k], both.start_qd[k])
     np.testing.assert_allclose(worlds.state(felt, k), 0.0, atol=1e-3)  # units of deviation, from float32
-    felt = worlds.advance(k, np.zeros((4, worlds.actions)))
+    felt = worlds.advance(k, np.zeros((4, worlds.action_size)))
     assert np.isfinite(worlds.cost(felt, k)).all()
 
 

@@ -5,13 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpdribble.learning import pushes
-from warpdribble.learning.policy import LinearPolicy
 from warpdribble.learning.pushes import DIRECTIONS, push_survival, push_table
 from warpdribble.learning.trials import States, planar, reference_states, run_trials
 
 
 def open_loop(task):
-    return LinearPolicy.zero(task.graph.count, task.actions, task.states)
+    return task.open_loop()
 
 
 @pytest.fixture
@@ -98,7 +97,7 @@ def test_only_falls_after_the_push_count(pushed, graph, row, share):
     worlds.fallen = falls
     shares = push_survival(worlds, open_loop(worlds), reference_states(graph), 10.0)
     np.testing.assert_array_equal(shares, [share, *np.ones(len(DIRECTIONS) - 1)])
-    on = np.array([np.any(force[0]) for force, _ in worlds.forces])
+    on = np.array([np.any(force[8]) for force, _ in worlds.forces])
     assert 3 < np.argmax(on) < 40
 
 
@@ -114,3 +113,23 @@ def test_the_largest_push_is_the_last_before_the_first_that_is_lost(task, graph,
     assert table.forces == [10, 20, 30]  # nobody survives all three; what is survived later does not count
     np.testing.assert_array_equal(table.largest(), [20.0] * 7 + [10.0])
     assert seen == [(1, " of 10 N"), (2, " of 20 N"), (3, " of 30 N")]
+
+
+def test_a_world_that_breaks_is_not_pushed(pushed, graph):
+    """It fell before its push, so nothing is known of it; the others are pushed as ever."""
+    worlds = pushed(16)
+    states = reference_states(graph)
+    joint_q = states.joint_q.copy()
+    real = worlds.fallen
+
+    def breaks(felt, k):
+        if len(worlds.forces) == 3:
+            state = worlds.sim.joint_q
+            state[0, 3:7] = np.nan
+            worlds.sim._write("q", np.arange(16), state)
+        return real(felt, k)
+
+    worlds.fallen = breaks
+    shares = push_survival(worlds, open_loop(worlds), States(states.k, joint_q, states.joint_qd), 10.0)
+    np.testing.assert_array_equal(shares, np.ones(len(DIRECTIONS)))  # world 8 stands for the direction
+    assert not any(np.any(force[0]) for force, _ in worlds.forces)

@@ -15,7 +15,6 @@ import pytest
 from warpdribble.learn import skill_fields, skill_graph, skill_text
 from warpdribble.learning import run as runs
 from warpdribble.learning.log import read_rows
-from warpdribble.learning.policy import LinearPolicy
 from warpdribble.learning.record import record
 from warpdribble.learning.run import Run, RunConfig, RunFolder
 from warpdribble.learning.samcon import SamconConfig
@@ -354,7 +353,7 @@ def test_the_reference_of_a_recording_goes_on_from_where_the_player_is(whole):
     goal[:, 3:7] = [[0.0, 0.0, np.sin(h / 2), np.cos(h / 2)] for h in aim[:, 2]]
     travelling = replace(run.graph, goal_q=goal)
     task = replace(run, graph=travelling).task(1)
-    zero = LinearPolicy.zero(travelling.count, task.actions, task.states)
+    zero = task.open_loop()
     seen = record(task, zero, run.states, seconds=0.5)
     places = planar(seen.reference_q[::5])
     assert places[0] == pytest.approx(planar(seen.joint_q[:1])[0], abs=1e-5)

@@ -326,7 +326,7 @@ ALL = range(ISLANDS)
 def run_walk(task, falls=lambda call: (), seed=1, **changes):
     config = replace(SMALL, disturbance=CALM, **{"walk": 60, **changes})
     watched = Watched(task(ISLANDS * PARTICLES), falls)
-    policy = LinearPolicy.zero(watched.graph.count, watched.actions, watched.states, 0.05)
+    policy = watched.open_loop(0.05)
     random = np.random.default_rng(seed)
     starts = reference_states(watched.graph).draw(ISLANDS, random)
     return watched, walk(watched, policy, config, starts, random)
@@ -436,7 +436,7 @@ def samcon(task, seed=1, config=SMALL, threads=None, **how):
 
 
 def assert_same_state(one, two):
-    one, two = one.state, two.state
+    one, two = one.saved, two.saved
     assert one.keys() == two.keys()
     for name, values in one.items():
         np.testing.assert_array_equal(values, two[name], err_msg=name)
@@ -448,12 +448,12 @@ def test_resumed_it_goes_on_bit_for_bit(task, tmp_path):
     for _ in range(2):
         one.iterate()
     assert np.isfinite(one.best_score) and len(one.states) != one.task.graph.count
-    np.savez(tmp_path / "state.npz", **one.state)
+    np.savez(tmp_path / "state.npz", **one.saved)
     two = samcon(task, seed=1)
     with np.load(tmp_path / "state.npz") as file:
         two.resume(dict(file))
     assert_same_state(one, two)
-    before, reports = one.state["policy.M"], []
+    before, reports = one.saved["policy.M"], []
     for learner in (one, two):
         learner.learn()
         report = learner.iterate()

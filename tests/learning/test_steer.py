@@ -7,7 +7,6 @@ from warpdribble.author import dribble_right
 from warpdribble.learning.disturbance import Disturbance
 from warpdribble.learning.graph import STEPS, cyclic_graph
 from warpdribble.learning.locomotion import Locomotion
-from warpdribble.learning.policy import LinearPolicy
 from warpdribble.learning.run import Run
 from warpdribble.learning.steer import Steered
 from warpdribble.learning.trials import reference_states, run_trials
@@ -44,7 +43,7 @@ def test_learned_on_stiff_hands_it_carries_the_full_player_and_a_ball(learned):
     graph = cyclic_graph(model, Cycle(dribble_right(model).reference))
     task = Locomotion(model, graph, 32)
     pushed = Disturbance(push=200.0, push_every=2.0)
-    blind = LinearPolicy.zero(graph.count, task.actions, task.states)
+    blind = task.open_loop()
     lasted = [
         run_trials(task, policy, reference_states(graph), 20, 1, 0.15, pushed).survived.mean()
         for policy in (learned.policy, blind)

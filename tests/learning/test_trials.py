@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from warpdribble.learning.disturbance import Disturbance
 from warpdribble.learning.graph import STEPS, cyclic_graph
 from warpdribble.learning.locomotion import FALLEN, FELT, JUDGED
-from warpdribble.learning.policy import LinearPolicy
 from warpdribble.learning.trials import (
     States,
     composed,
@@ -107,7 +106,7 @@ def test_states_are_drawn_with_noise_on_velocities_only(graph):
 
 
 def open_loop(task):
-    return LinearPolicy.zero(task.graph.count, task.actions, task.states)
+    return task.open_loop()
 
 
 def facing_ends(model, joint_q):

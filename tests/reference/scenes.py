@@ -34,8 +34,7 @@ def scene(worldbody: str, timestep=0.01, gravity="0 0 -9.81", rest: str = "") ->
 
 def ground(normal="0 0 1") -> str:
     return (
-        f'<geom name="ground" type="plane" size="0 0 1" zaxis="{normal}" friction="0.8"'
-        ' user="1 0.2 1e-5"/>'
+        f'<geom name="ground" type="plane" size="0 0 1" zaxis="{normal}" friction="0.8" user="1 0.2 1e-5"/>'
     )
 
 

@@ -46,9 +46,7 @@ def check(m, q, v, force):
     close(robot.kinetic(p), data.energy[1] - 0.5 * v @ (m.dof_armature * v))
     mujoco.mj_subtreeVel(m, data)
     total = sum(
-        m.body_subtreemass[b] * data.subtree_linvel[b]
-        for b in range(1, m.nbody)
-        if m.body_parentid[b] == 0
+        m.body_subtreemass[b] * data.subtree_linvel[b] for b in range(1, m.nbody) if m.body_parentid[b] == 0
     )
     close(robot.momentum(p)[3:], total)
     close(robot.momentum(p)[:3], data.subtree_angmom[0])

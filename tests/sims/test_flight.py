@@ -84,9 +84,7 @@ def test_momentum_of_one_body():
         v, L = sim.body_qd[0, 0, :3].copy(), spin()
         sim.step(round(1 / h))
         assert com.any()
-        np.testing.assert_allclose(
-            sim.body_qd[0, 0, :3], v + [0, 0, -9.81], atol=3 * h * 0.25 * np.sum(v**2)
-        )
+        np.testing.assert_allclose(sim.body_qd[0, 0, :3], v + [0, 0, -9.81], atol=3 * h * 0.25 * np.sum(v**2))
         drift.append(np.linalg.norm(spin() - L) / np.linalg.norm(L))
     print("angular drift of a tumbling body in 1 s", drift)
     assert drift[0] <= 2e-3 and first_order(drift)
@@ -160,9 +158,9 @@ def test_pendulum_converges_with_h():
         '<body><joint axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.1"/></body>'
     )
     k = 0.5 * 9.81 / (0.1 + 0.25)
-    exact = solve_ivp(
-        lambda t, y: [y[1], -k * np.sin(y[0])], (0, 2), [1.0, 0.0], rtol=1e-12, atol=1e-12
-    ).y[:, -1]
+    exact = solve_ivp(lambda t, y: [y[1], -k * np.sin(y[0])], (0, 2), [1.0, 0.0], rtol=1e-12, atol=1e-12).y[
+        :, -1
+    ]
     errors = []
     for h in (0.02, 0.01, 0.005, 0.0025):
         sim = Simulation(at_step(model, h), 1)

@@ -11,9 +11,7 @@ BODY = '<body name="b"><joint name="j"/><geom name="g" size="0.1"/></body>'
 
 
 def mjcf(worldbody=BODY, rest="", option="", before="") -> str:
-    return (
-        f"<mujoco>{before}<option {option}/><worldbody>{worldbody}</worldbody>{rest}</mujoco>"
-    )
+    return f"<mujoco>{before}<option {option}/><worldbody>{worldbody}</worldbody>{rest}</mujoco>"
 
 
 def joint(attributes):

@@ -62,9 +62,7 @@ def test_resampling_keeps_ends_duration_and_unit_length(rate, seed):
     assert abs(motion.duration * rate - (new.frame_count - 1)) <= 0.5 + 1e-9
     for frame in (0, -1):
         assert np.allclose(new.root_position[frame], motion.root_position[frame])
-        apart = Rotation.from_quat(new.rotations[frame]).inv() * Rotation.from_quat(
-            motion.rotations[frame]
-        )
+        apart = Rotation.from_quat(new.rotations[frame]).inv() * Rotation.from_quat(motion.rotations[frame])
         assert apart.magnitude().max() < 1e-7
 
 

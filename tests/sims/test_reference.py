@@ -70,8 +70,7 @@ def test_repeated_cycles_join_without_a_jump(player, count):
     assert steps[:, 6:].max() == pytest.approx(inside[:, 6:].max())
     length = np.linalg.norm(np.diff(joint_q[:, :2], axis=0), axis=1)
     assert (
-        length.max()
-        < 1.001 * np.linalg.norm(np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1).max()
+        length.max() < 1.001 * np.linalg.norm(np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1).max()
     )
 
 

@@ -57,9 +57,7 @@ def test_joints_are_near_the_recording_s_scaled_by_leg_length(player, dribble):
     motion = dribble.resample(1.0 / player.timestep)
     positions, _ = motion.forward()
     scale = 0.8917 / 0.866
-    hips = 0.5 * (
-        positions[:, motion.index("LeftUpLeg")] + positions[:, motion.index("RightUpLeg")]
-    )
+    hips = 0.5 * (positions[:, motion.index("LeftUpLeg")] + positions[:, motion.index("RightUpLeg")])
     root = body_q[:, player.body("pelvis"), :3]
     for body, joint in PLACES.items():
         ours = body_q[:, player.body(body), :3] - root

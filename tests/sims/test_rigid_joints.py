@@ -13,9 +13,7 @@ def test_stiff_hands_leave_51_degrees_of_freedom():
     assert model.nv == 45 + 6 + 6  # and the ball's six
     assert model.body_names == full.body_names
     assert model.tables["link_mass"].sum() == pytest.approx(full.tables["link_mass"].sum())
-    np.testing.assert_allclose(
-        Simulation(model, 1).body_q[0], Simulation(full, 1).body_q[0], atol=2e-6
-    )
+    np.testing.assert_allclose(Simulation(model, 1).body_q[0], Simulation(full, 1).body_q[0], atol=2e-6)
 
 
 def test_frozen_in_the_pose_asked_for():
@@ -28,9 +26,7 @@ def test_frozen_in_the_pose_asked_for():
 def test_it_moves_as_the_full_player_with_stiff_fingers():
     """Same mass matrix over the joints that are left, to the fingers' armature."""
     model, full = Model.load("player", rigid=FINGERS), Model.load("player")
-    keep = np.concatenate(
-        [np.arange(full.nv)[full.dof_slice(name)] for name in model.joint_names]
-    )
+    keep = np.concatenate([np.arange(full.nv)[full.dof_slice(name)] for name in model.joint_names])
     M = Simulation(full, 1).mass_matrix()[0][np.ix_(keep, keep)]
     np.testing.assert_allclose(Simulation(model, 1).mass_matrix()[0], M, atol=2e-5)
 

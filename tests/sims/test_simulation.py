@@ -248,9 +248,7 @@ def test_targets_follow_the_pose_until_set(model):
 
 def test_model_without_anything_to_touch():
     """No shapes, no drives, no contacts: still steps."""
-    lone = scenes.scene(
-        '<body><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
-    )
+    lone = scenes.scene('<body><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>')
     sim = Simulation(lone, 3)
     sim.step(100)
     np.testing.assert_allclose(sim.joint_qd[:, 2], -9.81, rtol=1e-5)

@@ -60,9 +60,7 @@ def bvh_text(bones, angles, root, frame_time=0.0083333):
         pad = "\t" * depth
         offset = " ".join(f"{v:.5f}" for v in bones[name][1])
         rotations = "Zrotation Yrotation Xrotation"
-        channels = (
-            f"6 Xposition Yposition Zposition {rotations}" if depth == 0 else f"3 {rotations}"
-        )
+        channels = f"6 Xposition Yposition Zposition {rotations}" if depth == 0 else f"3 {rotations}"
         lines.append(f"{pad}{'ROOT' if depth == 0 else 'JOINT'} {name}\n{pad}{{")
         lines.append(f"{pad}\tOFFSET {offset}\n{pad}\tCHANNELS {channels}")
         children = [n for n, (parent, _) in bones.items() if parent == name]

@@ -44,8 +44,7 @@ class Evaluate:
 
     def run(self) -> int:
         from ..learning.disturbance import Disturbance
-        from ..learning.policy import LinearPolicy
-        from ..learning.pushes import FORCES, PUSHED, push_table
+        from ..learning.pushes import FORCES, PLAYERS, push_table
         from ..learning.run import Run
         from ..learning.trials import run_trials
 
@@ -62,7 +61,7 @@ class Evaluate:
             task = warmed(run.task(self.trials, self.device))
         policy = run.policy
         if self.open_loop:
-            policy = LinearPolicy.zero(task.graph.count, task.actions, task.states)
+            policy = task.open_loop()
         with bar(f"{self.trials} trials", max(1, round(self.cycles * task.graph.count))) as progress:
             trials = run_trials(
                 task,
@@ -97,7 +96,7 @@ class Evaluate:
         }
         if self.pushes:
             with bar("pushes", len(FORCES)) as progress:
-                table = push_table(run.task(PUSHED, self.device), policy, run.states, self.seed, progress)
+                table = push_table(run.task(PLAYERS, self.device), policy, run.states, self.seed, progress)
             report["pushes"] = _plain(table)
         if self.format == "json":
             say(json.dumps(report, indent=2, allow_nan=False))
