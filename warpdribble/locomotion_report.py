@@ -2,8 +2,9 @@
 
     python -m warpdribble.locomotion_report FOLDER [docs/locomotion.md]
 
-tries every run below FOLDER, writes the tables between the page's markers and the curves into pictures/
-beside it. Runs of one skill that differ in their seed share a row.
+tries every run in FOLDER, writes the tables between the page's markers and the curves into pictures/ beside
+it. Runs of one skill that differ in their seed share a row. Runs in folders of their own, FOLDER/NAME/RUN,
+follow in tables of their own.
 """
 
 from __future__ import annotations
@@ -70,7 +71,9 @@ def measure(folder: Path) -> dict:
 
 
 def tables(runs: list[dict]) -> str:
-    """All tables as Markdown."""
+    """All tables as Markdown; nothing where there are no runs."""
+    if not runs:
+        return ""
     skills = {run["skill"]: [] for run in runs}
     for run in runs:
         skills[run["skill"]].append(run)
@@ -165,14 +168,20 @@ def draw_curves(folders: list[Path], out: Path) -> None:
 
 def main(folder: Path, page: Path) -> None:
     check_page(page)
-    folders = sorted(path.parent for path in folder.glob(f"*/{CONFIG}"))
-    runs = []
-    for one in folders:
-        runs.append(measure(one))
-        print({key: value for key, value in runs[-1].items() if key != "description"}, flush=True)
-    write_measured(page, tables(runs))
-    (page.parent / "pictures").mkdir(exist_ok=True)
-    draw_curves(folders, page.parent / "pictures" / CURVES)
+    parts = []
+    for place in (folder, *sorted(path for path in folder.iterdir() if not (path / CONFIG).exists())):
+        folders = sorted(path.parent for path in place.glob(f"*/{CONFIG}"))
+        runs = []
+        for one in folders:
+            runs.append(measure(one))
+            print({key: value for key, value in runs[-1].items() if key != "description"}, flush=True)
+        if place == folder:
+            (page.parent / "pictures").mkdir(exist_ok=True)
+            draw_curves(folders, page.parent / "pictures" / CURVES)
+        elif runs:
+            parts.append(f"### {place.name.replace('-', ' ').capitalize()}")
+        parts.append(tables(runs))
+    write_measured(page, "\n\n".join(part for part in parts if part))
 
 
 if __name__ == "__main__":
