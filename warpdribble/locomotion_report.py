@@ -169,7 +169,8 @@ def draw_curves(folders: list[Path], out: Path) -> None:
 def main(folder: Path, page: Path) -> None:
     check_page(page)
     parts = []
-    for place in (folder, *sorted(path for path in folder.iterdir() if not (path / CONFIG).exists())):
+    below = sorted(path for path in folder.iterdir() if path.is_dir() and not (path / CONFIG).exists())
+    for place in (folder, *below):
         folders = sorted(path.parent for path in place.glob(f"*/{CONFIG}"))
         runs = []
         for one in folders:
