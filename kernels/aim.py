@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .kinematics import load3, load4
+from .kinematics import load3, load4, store4
 from .spatial import *
 from .tree import BALL, HINGE, Tree, World
 
@@ -55,7 +55,4 @@ def aim(tree: Tree, world: World, course: Course, g: int, later: int):
                 world.target[g, iq] = world.target[g, iq] + course.offset[g, k]
             elif tree.link_joint[i] == BALL:
                 q = load4(world.target, g, iq) * exponential(load3(course.offset, g, k))
-                world.target[g, iq] = q.x
-                world.target[g, iq + 1] = q.y
-                world.target[g, iq + 2] = q.z
-                world.target[g, iq + 3] = q.w
+                store4(world.target, g, iq, q)

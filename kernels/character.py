@@ -7,7 +7,7 @@ root's first axis: neither the place nor the heading of a character in the world
 import warp as wp
 
 from .aim import choose
-from .kinematics import kinematics, load3, load4, store3
+from .kinematics import kinematics, load3, load4, own_inertia, store3
 from .spatial import *
 from .tree import HINGE, Tree, World
 
@@ -44,17 +44,6 @@ def facing(R: Mat3, a: Vec3) -> Vec3:
     cos = k * R.xx
     sin = k * R.yx
     return Vec3(cos * a.x + sin * a.y, cos * a.y - sin * a.x, a.z)
-
-
-@wp.func
-def momentum(tree: Tree, world: World, g: int, i: int) -> Force:
-    """Of a link, about its origin."""
-    k = world.mass_scale[g, i]
-    J = tree.link_moments[i]
-    P = tree.link_products[i]
-    R = world.R[g, i]
-    moments = Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2])
-    return rigid(R, k * tree.link_mass[i], rotate(R, tree.link_com[i]), moments) * world.V[g, i]
 
 
 @wp.struct
@@ -122,9 +111,10 @@ def sense(
         i = who.links[k]
         r = world.pos[g, i] - at
         m = world.mass_scale[g, i] * tree.link_mass[i]
-        F = momentum(tree, world, g, i)
+        c = rotate(world.R[g, i], tree.link_com[i])
+        F = own_inertia(tree, world, g, i, c) * world.V[g, i]
         mass = mass + m
-        com = com + m * (r + rotate(world.R[g, i], tree.link_com[i]))
+        com = com + m * (r + c)
         P = P + F.f
         L = L + F.n + cross(r, F.f)
     com = (1.0 / mass) * com

@@ -2,18 +2,14 @@
 
 import warp as wp
 
-from .kinematics import load3, load4, store3
+from .kinematics import load3, load4, store3, store4
 from .spatial import *
 from .tree import BALL, FREE, Tree, World
 
 
 @wp.func
 def turn_joint(world: World, g: int, iq: int, v: Vec3, h: Real):
-    q = normalize(load4(world.q, g, iq) * exponential(h * v))
-    world.q[g, iq] = q.x
-    world.q[g, iq + 1] = q.y
-    world.q[g, iq + 2] = q.z
-    world.q[g, iq + 3] = q.w
+    store4(world.q, g, iq, normalize(load4(world.q, g, iq) * exponential(h * v)))
 
 
 @wp.func

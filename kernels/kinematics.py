@@ -24,6 +24,14 @@ def store3(a: wp.array2d(dtype=Real), g: int, i: int, v: Vec3):
 
 
 @wp.func
+def store4(a: wp.array2d(dtype=Real), g: int, i: int, q: Quat):
+    a[g, i] = q.x
+    a[g, i + 1] = q.y
+    a[g, i + 2] = q.z
+    a[g, i + 3] = q.w
+
+
+@wp.func
 def joint_dofs(tree: Tree, i: int) -> int:
     joint = tree.link_joint[i]
     if joint == HINGE:
@@ -71,6 +79,16 @@ def kinematics(tree: Tree, world: World, g: int):
 
 
 @wp.func
+def own_inertia(tree: Tree, world: World, g: int, i: int, com: Vec3) -> Inertia:
+    """Of a link alone, about its origin; com: its centre of mass from there, along the world's axes."""
+    k = world.mass_scale[g, i]
+    J = tree.link_moments[i]
+    P = tree.link_products[i]
+    moments = Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2])
+    return rigid(world.R[g, i], k * tree.link_mass[i], com, moments)
+
+
+@wp.func
 def inertias(tree: Tree, world: World, g: int):
     """Each link's own inertia I; its acceleration A were no joint to accelerate; and the force p that
     A and its velocity ask for [2.72, 5.3], less gravity, about the link's origin."""
@@ -85,12 +103,9 @@ def inertias(tree: Tree, world: World, g: int):
         A = Motion(
             above.w + cross(w0, w), above.v + cross(above.w, r) + cross(w0, cross(w0, r))
         )
-        k = world.mass_scale[g, i]
-        J = tree.link_moments[i]
-        P = tree.link_products[i]
-        mass = k * tree.link_mass[i]
+        mass = world.mass_scale[g, i] * tree.link_mass[i]
         com = rotate(R, tree.link_com[i])
-        I = rigid(R, mass, com, Sym3(k * J[0], k * P[0], k * P[1], k * J[1], k * P[2], k * J[2]))
+        I = own_inertia(tree, world, g, i, com)
         fall = A.v - gravity
         f = mass * (fall + cross(A.w, com) + cross(w, cross(w, com)))
         n = I.A * A.w + cross(w, I.A * w) + mass * cross(com, fall)

@@ -46,9 +46,10 @@ class ControlGraph:
         ends = np.setdiff1d(np.arange(self.count), edges[:, 0])
         if len(ends):
             raise ValueError(f"no fragment follows fragment {ends[0]}: a random walk would end there")
-        after = [edges[edges[:, 0] == k, 1] for k in range(self.count)]
         object.__setattr__(self, "edges", edges)
-        object.__setattr__(self, "_after", after)
+        order = np.argsort(edges[:, 0], kind="stable")
+        object.__setattr__(self, "_after", edges[order, 1])
+        object.__setattr__(self, "_first", np.searchsorted(edges[order, 0], np.arange(self.count + 1)))
 
     @property
     def count(self) -> int:
@@ -62,8 +63,8 @@ class ControlGraph:
 
     def follow(self, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
         """For each fragment k (n,) one that follows it, drawn evenly (n,)."""
-        draw = random.random(len(k))
-        return np.array([self._after[i][int(u * len(self._after[i]))] for i, u in zip(k, draw)])
+        first = self._first[k]
+        return self._after[first + (random.random(len(k)) * (self._first[k + 1] - first)).astype(int)]
 
     def save(self, path: str | Path) -> None:
         """Write an .npz file."""

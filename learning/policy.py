@@ -45,6 +45,5 @@ class LinearPolicy:
 
     def moved(self, other: LinearPolicy, share: float) -> LinearPolicy:
         """This policy, moved a share of the way to another."""
-        return LinearPolicy(
-            *((1.0 - share) * getattr(self, x) + share * getattr(other, x) for x in ("M", "a_hat", "sigma"))
-        )
+        pairs = zip(vars(self).values(), vars(other).values())
+        return LinearPolicy(*((1.0 - share) * mine + share * its for mine, its in pairs))

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from ..sims.reference import resample_q
+from ..sims.reference import over_ground, resample_q
 from ..sims.simulation import NONFINITE
 from .disturbance import CALM, Disturbance
 from .graph import STEPS, ControlGraph
@@ -75,7 +74,5 @@ def _reference(model, graph: ControlGraph, k: int, at: np.ndarray) -> tuple[np.n
     rows = resample_q(model, ends, np.linspace(0.0, 1.0, STEPS + 1))
     own = planar(ends)
     turn = at[0, 2] - own[0, 2]
-    by = Rotation.from_rotvec([0.0, 0.0, turn])
-    rows[:, :2] = (rows[:, :2] - own[0, :2]) @ by.as_matrix()[:2, :2].T + at[0, :2]
-    rows[:, 3:7] = (by * Rotation.from_quat(rows[:, 3:7])).as_quat()
+    rows[:, :7] = over_ground(rows[:, :7], own[0, :2], at[0, :2], turn)
     return rows, composed(at, relative(own[:1], own[1:]))

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -358,8 +358,8 @@ class Samcon:
     def resume(self, state: dict[str, np.ndarray]) -> None:
         """Go on from what was `saved`."""
         for name in ("policy", "mean", "best"):
-            setattr(self, name, LinearPolicy(*(state[f"{name}.{x}"] for x in ("M", "a_hat", "sigma"))))
+            setattr(self, name, LinearPolicy(*(state[f"{name}.{f.name}"] for f in fields(LinearPolicy))))
         for name in ("states", "best_states"):
-            setattr(self, name, States(*(state[f"{name}.{x}"] for x in ("k", "joint_q", "joint_qd"))))
+            setattr(self, name, States(*(state[f"{name}.{f.name}"] for f in fields(States))))
         self.iteration, self.best_score = int(state["iteration"]), float(state["best_score"])
         self.random.bit_generator.state = json.loads(str(state["random"]))

@@ -209,10 +209,14 @@ class Batch:
         dtype = array.dtype.numpy_dtype() if structured else np.float32
         array.assign(np.ascontiguousarray(rows).reshape(-1).view(dtype).reshape(array.shape))
 
+    def _padded(self, values: np.ndarray) -> np.ndarray:
+        """Values (world_count, ...) with the last world's repeated for the unused ones of its group."""
+        spare = self.groups * self.lanes - self.world_count
+        return np.pad(values, [(0, spare)] + [(0, 0)] * (np.ndim(values) - 1), mode="edge")
+
     def _fill(self, array: wp.array, values: np.ndarray) -> None:
         """Set an array `(groups, n)` of Reals from `values` (world_count, n)."""
-        spare = self.groups * self.lanes - self.world_count
-        values = np.pad(np.asarray(values, np.float32), ((0, spare), (0, 0)), mode="edge")
+        values = self._padded(np.asarray(values, np.float32))
         values = values.reshape(self.groups, self.lanes, -1).transpose(0, 2, 1)
         self._assign(array, values[:, :, None])
 

@@ -90,8 +90,7 @@ class Character:
         rows = np.broadcast_to(np.asarray(rows, np.int32), (self.sim.world_count,))
         if rows.min() < 0 or rows.max() >= end:
             raise IndexError(f"rows must lie in 0 .. {end - 1}")
-        spare = self.sim.groups * self.sim.lanes - self.sim.world_count
-        array.assign(np.pad(rows, (0, spare), mode="edge").reshape(array.shape))
+        array.assign(self.sim._padded(rows).reshape(array.shape))
         return array
 
     def sense(self, rows) -> np.ndarray:

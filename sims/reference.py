@@ -76,7 +76,7 @@ class Cycle:
         along = []
         for part in loose:
             first = self.reference.joint_q[:1, part]
-            goal = _over_ground(first, anchor, anchor + np.asarray(self.travel), self.turn)[0]
+            goal = over_ground(first, anchor, anchor + np.asarray(self.travel), self.turn)[0]
             if np.linalg.norm(goal[:3] - last[part][:3]) < ALONG:
                 along.append(part)
         return along
@@ -90,7 +90,7 @@ class Cycle:
             place = place + _plane(i * self.turn) @ np.asarray(self.travel)
         joint_q = joint_q.copy()
         for part in free:
-            joint_q[:, part] = _over_ground(joint_q[:, part], anchor, anchor + place, number * self.turn)
+            joint_q[:, part] = over_ground(joint_q[:, part], anchor, anchor + place, number * self.turn)
         return joint_q
 
 
@@ -111,7 +111,7 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
         turn, travel = 0.0, np.zeros(2)
     goal = first.copy()
     anchor = first[root][:2]
-    goal[root] = _over_ground(first[root][None], anchor, anchor + travel, turn)[0]
+    goal[root] = over_ground(first[root][None], anchor, anchor + travel, turn)[0]
     missing = difference(model, last[None], goal[None])
     faster = _speed(model, reference, slice(0, 4)) - _speed(model, reference, slice(-4, None))
     if reference.frame_count < 8:
@@ -207,7 +207,7 @@ def _plane(angle: float) -> np.ndarray:
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
-def _over_ground(poses, pivot, place, turn: float) -> np.ndarray:
+def over_ground(poses, pivot, place, turn: float) -> np.ndarray:
     """Root poses (frames, 7) turned about the vertical through `pivot` (2,), which then lies at
     `place` (2,)."""
     poses = np.array(poses, dtype=float)

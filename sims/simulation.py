@@ -112,9 +112,8 @@ class Simulation(Batch):
         sources = self._worlds(sources)
         if sources.shape != (self.world_count,):
             raise ValueError(f"sources must have shape ({self.world_count},), not {sources.shape}")
-        spare = self.groups * self.lanes - self.world_count
-        padded = np.pad(sources, (0, spare), mode="edge").reshape(self.groups, self.lanes)
-        moves = wp.array(padded, dtype=int, device=self.device)
+        moves = self._padded(sources).reshape(self.groups, self.lanes)
+        moves = wp.array(moves, dtype=int, device=self.device)
         state = self._carried
         if (sources[sources] != sources).any():  # a world that is copied from changes, too
             state = self.snapshot()

@@ -137,17 +137,17 @@ def _pushes(skills: dict[str, list[dict]]) -> list[str]:
 
 def draw_curves(folders: list[Path], out: Path) -> None:
     """Share of trials under training disturbances that survive, over the time spent, a panel per skill."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from .sheet import save
 
     skills: dict[str, list[Path]] = {}
     for folder in folders:
         skills.setdefault(Run.load(folder).config["skill"]["name"], []).append(folder)
     columns = min(3, len(skills))
     shape = (-(-len(skills) // columns), columns)
-    figure, axes = plt.subplots(*shape, figsize=(3.4 * columns, 2.2 * shape[0]), squeeze=False, sharey=True)
+    figure = Figure(figsize=(3.4 * columns, 2.4 * shape[0]), dpi=110, layout="constrained")
+    axes = figure.subplots(*shape, squeeze=False, sharey=True)
     for ax, (name, runs) in zip(axes.flat, skills.items()):
         for folder in runs:
             rows = [row for row in read_rows(folder) if math.isfinite(row["survived"])]
@@ -161,9 +161,7 @@ def draw_curves(folders: list[Path], out: Path) -> None:
         ax.set_ylabel("% survive")
     for ax in list(axes.flat)[len(skills) :]:
         ax.axis("off")
-    figure.tight_layout()
-    figure.savefig(out, dpi=110)
-    plt.close(figure)
+    save(figure, "Trials under training disturbances that survive, by seed", out)
 
 
 def main(folder: Path, page: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import sys
 
@@ -85,3 +86,12 @@ def check_range(option: str, value: float, least: float, most: float) -> None:
     """Raise ValueError for a number outside a range, or none."""
     if not least <= value <= most:
         raise ValueError(f"{option} {value:g}: give a number from {least:g} to {most:g}")
+
+
+def without_nan(value):
+    """For JSON, which has no NaN: null in its place, all the way down."""
+    if isinstance(value, dict):
+        return {key: without_nan(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [without_nan(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

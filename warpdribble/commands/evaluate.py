@@ -10,7 +10,7 @@ from typing import Literal
 
 from tyro.conf import Positional
 
-from .console import bar, check_range, compiling, find_device, say, warmed
+from .console import bar, check_range, compiling, find_device, say, warmed, without_nan
 
 
 @dataclass
@@ -88,16 +88,17 @@ class Evaluate:
             "seed": self.seed,
             "survived": int(trials.survived.sum()),
             "lived": float(trials.lived.mean()),
-            "cost": _number(trials.cost),
-            "angle_error_deg": _number(math.degrees(trials.angle_error)),
-            "end_error_cm": _number(100.0 * trials.end_error),
-            "drift_cm_per_cycle": _number(100.0 * trials.drift),
-            "turn_deg_per_cycle": _number(math.degrees(trials.turn)),
+            "cost": trials.cost,
+            "angle_error_deg": math.degrees(trials.angle_error),
+            "end_error_cm": 100.0 * trials.end_error,
+            "drift_cm_per_cycle": 100.0 * trials.drift,
+            "turn_deg_per_cycle": math.degrees(trials.turn),
         }
         if self.pushes:
             with bar("pushes", len(FORCES)) as progress:
                 table = push_table(run.task(PLAYERS, self.device), policy, run.states, self.seed, progress)
-            report["pushes"] = _plain(table)
+            report["pushes"] = _table(table)
+        report = without_nan(report)
         if self.format == "json":
             say(json.dumps(report, indent=2, allow_nan=False))
         else:
@@ -106,12 +107,7 @@ class Evaluate:
         return 0
 
 
-def _number(value: float) -> float | None:
-    """JSON has no NaN."""
-    return float(value) if math.isfinite(value) else None
-
-
-def _plain(table) -> dict:
+def _table(table) -> dict:
     from ..learning.pushes import DIRECTIONS, ENOUGH, PUSH_TIME
 
     largest = table.largest()
@@ -120,7 +116,7 @@ def _plain(table) -> dict:
         "enough": ENOUGH,
         "forces": table.forces,
         "directions": list(DIRECTIONS),
-        "survived": [[_number(share) for share in row] for row in table.survived],
+        "survived": table.survived.tolist(),
         "largest": dict(zip(DIRECTIONS, largest.tolist())),
         "largest_in_every_direction": float(largest.min()),
     }

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from tyro.conf import subcommand
 
 from .clip_input import ClipInput
-from .console import say
+from .console import say, without_nan
 from .retarget import Cycles, Retarget
 
 MOST = 12
@@ -32,7 +32,7 @@ class Info(ClipInput):
         quality = examine(motion, self.frames[0])
         if self.format == "json":
             report = {"clip": str(self.clip), "notes": notes} | asdict(quality)
-            say(json.dumps(_plain(report), indent=2, allow_nan=False))
+            say(json.dumps(without_nan(report), indent=2, allow_nan=False))
         else:
             for line in _table(self, notes, quality):
                 say(line)
@@ -118,12 +118,3 @@ def _list(items) -> str:
 
 def _span(event) -> str:
     return str(event.first) if event.first == event.last else f"{event.first}-{event.last}"
-
-
-def _plain(value):
-    """NaN as null, all the way down."""
-    if isinstance(value, dict):
-        return {key: _plain(v) for key, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
