@@ -260,9 +260,7 @@ def leg() -> list[Body]:
     ankle = vec(0, HIP_Y, ANKLE_HEIGHT)
     knee = ankle + vec(0, 0, LENGTH["shank"])
     hip = knee + vec(0, 0, LENGTH["thigh"])
-    heel, ball, tip = (
-        vec((x - ANKLE_FROM_HEEL) * LENGTH["foot"], HIP_Y, 0) for x in (0, BALL_FROM_HEEL, 1)
-    )
+    heel, ball, tip = (vec((x - ANKLE_FROM_HEEL) * LENGTH["foot"], HIP_Y, 0) for x in (0, BALL_FROM_HEEL, 1))
     half, up = vec(0, FOOT_BREADTH / 2, 0), vec(0, 0, TOE_RADIUS)
     sole = Geom("box", "shoe", 0, heel - half, ball + half + vec(0, 0, 0.8 * ANKLE_HEIGHT))
     centre, side = tip + vec(-TOE_RADIUS, 0, TOE_RADIUS), half - vec(0, TOE_RADIUS, 0)

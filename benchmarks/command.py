@@ -15,7 +15,7 @@ import tyro
 
 from ..commands.console import quiet_warp
 from ..sims import Simulation
-from ..sims.simulation import SWEEPS
+from ..sims.worlds.simulation import SWEEPS
 from .mjwarp import MuJoCoWarp
 from .mujoco import SETTINGS, MuJoCo
 from .ours import Ours, solver_error
@@ -88,9 +88,7 @@ def step(options: Step) -> Result:
     quiet_warp()
     scene = hold(max(options.worlds), options.rounds)
     start = time.perf_counter()
-    sides = [
-        Ours(scene, n, options.device, options.threads, options.lanes) for n in options.worlds
-    ]
+    sides = [Ours(scene, n, options.device, options.threads, options.lanes) for n in options.worlds]
     sides[0].advance()
     first = time.perf_counter() - start
     peers = {}
@@ -108,9 +106,7 @@ def step(options: Step) -> Result:
     result = Result(processor(), str(sim.device), sim.threads, sim.lanes)
     for n, side in zip(options.worlds, sides, strict=True):
         per_step = float(np.median(times[side]))
-        result.rows.append(
-            dict(worlds=n, steps_per_second=round(1 / per_step), us_per_world=1e6 * per_step)
-        )
+        result.rows.append(dict(worlds=n, steps_per_second=round(1 / per_step), us_per_world=1e6 * per_step))
     result.first_step_s = first
     result.kib_per_world = sim.memory_per_world / 1024
     result.contacts = sides[0].contacts()
@@ -163,9 +159,7 @@ def print_step(result: Result) -> None:
     )
     print(f"{'worlds':>10} {'steps/s':>12} {'us per world-step':>18}")
     for row in result.rows:
-        print(
-            f"{row['worlds']:>10} {row['steps_per_second']:>12,} {row['us_per_world']:>18.2f}"
-        )
+        print(f"{row['worlds']:>10} {row['steps_per_second']:>12,} {row['us_per_world']:>18.2f}")
     total = sum(result.parts_us.values())
     for name, us in result.parts_us.items():
         print(f"{name:>16} {us:8.3f} us {100 * us / total:5.1f} %")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..sims import Model
-from ..sims.mjcf import wxyz
+from ..sims.model.mjcf import wxyz
 
 FRAGMENT = 5
 """Steps between new targets: one control fragment of 0.05 s (P1 3.2)."""

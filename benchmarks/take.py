@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..replay import write_replay
-from ..sims import Model, pose
-from ..take import Take, write_take
+from ..sims import Model
+from ..sims.model import pose
+from ..takes.take import Take, write_take
+from ..web.page import write_replay
 
 FRAMES = 600
 ROUNDS = 5

@@ -157,9 +157,7 @@ def hinge_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
         weight = dot(s, b.I.A * s) + drive.load
         upper = stop(tree, tree.link_upper[i] - q, v, weight)
         lower = stop(tree, q - tree.link_lower[i], neg(v), weight)
-        drive = Push(
-            drive.force + upper.force - lower.force, drive.load + upper.load + lower.load
-        )
+        drive = Push(drive.force + upper.force - lower.force, drive.load + upper.load + lower.load)
     return take_out_turn(world, g, j, b, s, v, drive.force, drive.load, tree.h)
 
 

@@ -78,9 +78,7 @@ def miss(
         choose(q, rows, g, 0, iq + 3),
     )
     rate = Vec3(choose(qd, rows, g, 0, iv), choose(qd, rows, g, 0, iv + 1), choose(qd, rows, g, 0, iv + 2))
-    return Miss(
-        norm(logarithm(conjugate(goal) * load4(world.q, g, iq))), norm(load3(world.qd, g, iv) - rate)
-    )
+    return Miss(norm(logarithm(conjugate(goal) * load4(world.q, g, iq))), norm(load3(world.qd, g, iv) - rate))
 
 
 @wp.kernel

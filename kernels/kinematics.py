@@ -100,9 +100,7 @@ def inertias(tree: Tree, world: World, g: int):
         w = world.V[g, i].w
         w0 = world.V[g, parent].w
         above = world.A[g, parent]
-        A = Motion(
-            above.w + cross(w0, w), above.v + cross(above.w, r) + cross(w0, cross(w0, r))
-        )
+        A = Motion(above.w + cross(w0, w), above.v + cross(above.w, r) + cross(w0, cross(w0, r)))
         mass = world.mass_scale[g, i] * tree.link_mass[i]
         com = rotate(R, tree.link_com[i])
         I = own_inertia(tree, world, g, i, com)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..sims.feedforward import leading_targets
-from ..sims.reference import Cycle, Reference, resample_q
+from ..sims.reference.feedforward import leading_targets
+from ..sims.reference.reference import Cycle, Reference, resample_q
 
 STEPS = 5
 """Time steps of a control fragment: 0.05 s (P1 3.2)."""

@@ -1,7 +1,55 @@
-"""The player, the ball and the court: worlds that step, reset, observe and record."""
+"""The player, the ball and the court: models, worlds that step, recordings, references.
 
-from .mjcf import ModelError
-from .model import Model
-from .simulation import Simulation
+Public names stand here; what is deeper may move.
+"""
 
-__all__ = ["Model", "ModelError", "Simulation"]
+from typing import TYPE_CHECKING
+
+from ..lazy import lazily
+
+if TYPE_CHECKING:
+    from .authored import AUTHORED, authored_clip
+    from .ball import Ball, inferred_ball, recorded_ball
+    from .model import Model, ModelError
+    from .recording import Motion
+    from .reference import Cycle, Reference, close_cycle, mirrored
+    from .retarget import MappingError, find_mapping, read_mapping, retargeted
+    from .worlds import BAD_CONTACT, FALL, NONFINITE, OVERSPEED, Contacts, Simulation
+
+__all__ = [
+    "AUTHORED",
+    "BAD_CONTACT",
+    "FALL",
+    "NONFINITE",
+    "OVERSPEED",
+    "Ball",
+    "Contacts",
+    "Cycle",
+    "MappingError",
+    "Model",
+    "ModelError",
+    "Motion",
+    "Reference",
+    "Simulation",
+    "authored_clip",
+    "close_cycle",
+    "find_mapping",
+    "inferred_ball",
+    "mirrored",
+    "read_mapping",
+    "recorded_ball",
+    "retargeted",
+]
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        ".authored": "AUTHORED authored_clip",
+        ".ball": "Ball inferred_ball recorded_ball",
+        ".model": "Model ModelError",
+        ".recording": "Motion",
+        ".reference": "Cycle Reference close_cycle mirrored",
+        ".retarget": "MappingError find_mapping read_mapping retargeted",
+        ".worlds": "Simulation Contacts NONFINITE FALL BAD_CONTACT OVERSPEED",
+    },
+)

@@ -1,4 +1,4 @@
-"""The five folders import as warpdribble.* from a wheel, an sdist, an editable or bare checkout.
+"""The folders import as warpdribble.* from a wheel, an sdist, an editable or bare checkout.
 
 Everything is built from a copy of the tree, offline, with the installed setuptools.
 """
@@ -12,22 +12,31 @@ import sysconfig
 import tarfile
 import tomllib
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ["warpdribble", "warpdribble/commands", "kernels", "sims", "learning", "assets", "benchmarks"]
+TOP = ["warpdribble", "kernels", "sims", "learning", "assets", "benchmarks"]
+PACKAGES = {
+    ".".join(dict.fromkeys(["warpdribble", *init.parent.relative_to(ROOT).parts])): init.parent
+    for top in TOP
+    for init in sorted((ROOT / top).rglob("__init__.py"))
+}
+"""Import name -> folder of every package there is."""
 NOT_SOURCE = shutil.ignore_patterns(
     ".git", ".venv*", "venv*", "build", "dist", "out", "*.egg-info", "__pycache__", ".*_cache",
     ".hypothesis", "shared",
 )  # fmt: skip
 
-IMPORT_ALL = """
+IMPORT_ALL = f"""
 from importlib import import_module, resources
-for name in ["", ".commands", ".kernels", ".sims", ".learning", ".assets", ".benchmarks"]:
-    module = import_module("warpdribble" + name)
+for name in {list(PACKAGES)}:
+    module = import_module(name)
     print(module.__name__, module.__file__)
+    for public in getattr(module, "__all__", []):
+        assert hasattr(module, public), (name, public)
 assert (resources.files("warpdribble.assets") / "player.xml").is_file()
 """
 
@@ -68,10 +77,10 @@ def install(env_python, *what):
 
 
 def check_imports(env_python, cwd, below):
-    """All five packages import, from below this folder, and the player is found."""
+    """All packages import, from below this folder, and the player is found."""
     files = [line.split()[1] for line in run(env_python, "-c", IMPORT_ALL, cwd=cwd).splitlines()
              if line.startswith("warpdribble")]  # fmt: skip
-    assert len(files) == len(FOLDERS)
+    assert len(files) == len(PACKAGES)
     assert all(Path(file).is_relative_to(below) for file in files), files
 
 
@@ -92,8 +101,8 @@ def test_wheel_imports(tmp_path, via_sdist):
     wheel = build("wheel", tree, tmp_path)
 
     names = set(zipfile.ZipFile(wheel).namelist())
-    for folder in FOLDERS:
-        prefix = "" if folder.startswith("warpdribble") else "warpdribble/"
+    for folder in TOP:
+        prefix = "" if folder == "warpdribble" else "warpdribble/"
         pattern = "*" if folder == "assets" else "*.py"
         files = [f.relative_to(ROOT) for f in (ROOT / folder).rglob(pattern) if f.is_file()]
         expected = {prefix + f.as_posix() for f in files if "__pycache__" not in f.parts}
@@ -125,15 +134,17 @@ def test_version_comes_from_the_package(tmp_path):
 
 
 def test_pyproject_lists_what_exists():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    mapping = project["tool"]["setuptools"]["package-dir"]
-    assert sorted(mapping.values()) == sorted(FOLDERS)
-    assert sorted(mapping) == sorted(project["tool"]["setuptools"]["packages"])
-    for folder in FOLDERS:
-        assert (ROOT / folder / "__init__.py").is_file()
-        found = [p.parent.relative_to(ROOT) for p in (ROOT / folder).glob("*/**/__init__.py")]
-        sub = [p for p in found if p.as_posix() not in FOLDERS]
-        assert not sub, f"{sub}: a sub-package needs a line in pyproject.toml"
+    setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    assert sorted(setuptools["packages"]) == sorted(PACKAGES)
+    assert sorted(setuptools["package-dir"].values()) == sorted(TOP)
+
+
+def test_public_names_are_no_modules():
+    """A module of the same name would take the name's place once it is imported."""
+    for name, folder in PACKAGES.items():
+        public = getattr(import_module(name), "__all__", [])
+        beside = {p.stem for p in folder.iterdir()} - {"__init__"}
+        assert not beside & set(public), name
 
 
 def test_import_is_light():

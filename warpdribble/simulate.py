@@ -12,13 +12,13 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .clips import ClipError, read_part
-from .sims import gaps, pose
-from .sims.feedforward import leading_targets
-from .sims.mapping import MappingError, find_mapping, read_mapping
-from .sims.reference import Reference, difference, root_joint
-from .sims.retarget import retarget
-from .sims.simulation import NONFINITE
+from .clips.read import ClipError, read_part
+from .sims.model import gaps, pose
+from .sims.reference.feedforward import leading_targets
+from .sims.reference.reference import Reference, difference, root_joint
+from .sims.retarget.mapping import MappingError, find_mapping, read_mapping
+from .sims.retarget.retarget import retarget
+from .sims.worlds.simulation import NONFINITE
 
 ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
 """Virtual gains of a tracked root: [N/m], [N s/m], [N m/rad], [N m s/rad]. The rates are a tenth

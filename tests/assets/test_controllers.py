@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from warpdribble.learning.disturbance import Disturbance
-from warpdribble.learning.pushes import push_survival
-from warpdribble.learning.run import Run, shipped_controllers
-from warpdribble.learning.trials import run_trials
+from warpdribble.learning.evaluate.pushes import push_survival
+from warpdribble.learning.evaluate.trials import run_trials
+from warpdribble.learning.runs.folder import Run, shipped_controllers
+from warpdribble.learning.tasks.disturbance import Disturbance
 
 
 @pytest.mark.parametrize("name", shipped_controllers())

@@ -42,7 +42,7 @@ def test_cuda_agrees_with_cpu():
 def test_a_walk_on_cuda_agrees_with_the_cpu():
     """A shipped policy over ten fragments, worlds copied in between: targets along tables, what is felt, and
     the copies, on both devices."""
-    from warpdribble.learning.run import Run
+    from warpdribble.learning.runs.folder import Run
 
     run = Run.load("dribble-right-authored")
     felt = []

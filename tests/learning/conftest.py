@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpdribble.authored import authored
 from warpdribble.learning.graph import cyclic_graph
-from warpdribble.learning.locomotion import Locomotion, locomotion_model
+from warpdribble.learning.tasks.locomotion import Locomotion, locomotion_model
 from warpdribble.sims import Model
-from warpdribble.sims.reference import Cycle, Reference
+from warpdribble.sims.authored.catalogue import authored_clip
+from warpdribble.sims.reference.reference import Cycle, Reference
 
 
 @pytest.fixture(scope="session")
@@ -22,7 +22,7 @@ def player():
 def dribble(player):
     """A cycle of 70 steps in place, the ball left out."""
     full = Model.load("player")
-    reference = authored(full, "dribble_right").reference
+    reference = authored_clip(full, "dribble_right").reference
     return Cycle(replace(reference, joint_q=player.convert_q(full, reference.joint_q)))
 
 

@@ -11,8 +11,8 @@ from scipy.stats import chisquare
 
 from warpdribble.learning.graph import SHORTEST, STEPS, ControlGraph, cyclic_graph, joined
 from warpdribble.sims import Model
-from warpdribble.sims.feedforward import SHARE
-from warpdribble.sims.reference import Cycle, Reference, resample_q
+from warpdribble.sims.reference.feedforward import SHARE
+from warpdribble.sims.reference.reference import Cycle, Reference, resample_q
 
 EXACT = 1e-9  # float64 through a few rotations, [m], [rad]; velocities divide by steps of 0.01 s
 
@@ -74,11 +74,11 @@ def test_a_cycle_along_a_curve_is_tiled(player, curve):
 
 
 def test_recorded_walking_is_tiled(player, mocap):
-    from warpdribble.play import play
-    from warpdribble.skills import skill
+    from warpdribble.skills.skill import read_skill
+    from warpdribble.skills.staged import stage_skill
 
     full = Model.load("player")
-    cycle = play(full, skill("walk"), mocap).cycle
+    cycle = stage_skill(full, read_skill("walk"), mocap).cycle
     joint_q = player.convert_q(full, cycle.reference.joint_q)
     cycle = replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
     graph = cyclic_graph(player, cycle)

@@ -109,7 +109,7 @@ def cmu_clip(tmp_path):
 def ballplay_clip(tmp_path):
     """Path of a BallPlay-M clip of 30 frames: arms spread, turned a quarter about the vertical, the ball
     falling, in hand for the first 10 frames."""
-    from warpdribble.ballplay import COLUMNS, SKELETON, TO_MOTION
+    from warpdribble.clips.ballplay import COLUMNS, SKELETON, TO_MOTION
 
     rows = np.zeros((30, COLUMNS), np.float32)
     turn = Rotation.from_rotvec([0.0, 0.0, np.pi / 2]) * Rotation.from_matrix(TO_MOTION)
@@ -205,9 +205,9 @@ def shipped_player():
 @pytest.fixture(scope="session")
 def dribble_take(shipped_player):
     """The authored dribble as a take of 36 frames at 50 fps, with its physics."""
-    from warpdribble.author import dribble_right
-    from warpdribble.sims import pose
-    from warpdribble.take import Take
+    from warpdribble.sims.authored.dribble import dribble_right
+    from warpdribble.sims.model import pose
+    from warpdribble.takes.take import Take
 
     joint_q = dribble_right(shipped_player).reference.joint_q[::2]
     return Take.of(shipped_player, pose.forward(shipped_player, joint_q), 50.0, notes={"clip": "authored"})

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpdribble.cli import main
-from warpdribble.take import validate
+from warpdribble.takes.take import validate
 
 ROOT = Path(__file__).resolve().parents[2]
 

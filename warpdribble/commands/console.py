@@ -75,7 +75,7 @@ def check_device(device: str) -> None:
 
 def find_device(device: str) -> None:
     """Raise ValueError for a device that is not there. Silences Warp."""
-    from ..sims import batch
+    from ..sims.worlds import batch
 
     check_device(device)
     quiet_warp()

@@ -43,10 +43,10 @@ class Evaluate:
     """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
-        from ..learning.disturbance import Disturbance
-        from ..learning.pushes import FORCES, PLAYERS, push_table
-        from ..learning.run import Run
-        from ..learning.trials import run_trials
+        from ..learning.evaluate.pushes import FORCES, PLAYERS, push_table
+        from ..learning.evaluate.trials import run_trials
+        from ..learning.runs.folder import Run
+        from ..learning.tasks.disturbance import Disturbance
 
         check_range("--cycles", self.cycles, 0.1, 1e5)
         check_range("--trials", self.trials, 1, 2**16)
@@ -108,7 +108,7 @@ class Evaluate:
 
 
 def _table(table) -> dict:
-    from ..learning.pushes import DIRECTIONS, ENOUGH, PUSH_TIME
+    from ..learning.evaluate.pushes import DIRECTIONS, ENOUGH, PUSH_TIME
 
     largest = table.largest()
     return {

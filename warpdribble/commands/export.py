@@ -25,10 +25,10 @@ class Export(Outputs):
     """Of the start and the pushes."""
 
     def run(self) -> int:
-        from ..learning.disturbance import Disturbance
-        from ..learning.record import record
-        from ..learning.run import Run
-        from ..sims.reference import Reference
+        from ..learning.evaluate.record import record
+        from ..learning.runs.folder import Run
+        from ..learning.tasks.disturbance import Disturbance
+        from ..sims.reference.reference import Reference
         from ..simulate import measure
 
         check_range("--seconds", self.seconds, 0.05, 600.0)

@@ -23,7 +23,7 @@ class Fetch:
     """Folder or URL that has the files already, instead of their public home."""
 
     def run(self) -> int:
-        from ..fetch import SETS, data_folder, entries, fetch
+        from ..clips.data import SETS, data_folder, entries, fetch
 
         folder = self.to or data_folder()
         about = SETS[self.name]

@@ -33,16 +33,16 @@ class Learn:
     """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
-        from ..learn import check_cyclic, skill_fields, skill_text
-        from ..learning.run import RunConfig, RunFolder
-        from ..skills import skill
+        from ..learning.runs.folder import RunConfig, RunFolder
+        from ..skills.graph import check_cyclic, skill_fields, skill_text
+        from ..skills.skill import read_skill
 
         check_range("--seed", self.seed, 0, 2**32)
         if self.iterations is not None:
             check_range("--iterations", self.iterations, 1, 1e6)
         if self.data is not None and not self.data.is_dir():
             raise ValueError(f"--data {self.data}: no such folder")
-        one = skill(self.skill)
+        one = read_skill(self.skill)
         check_cyclic(one)
         find_device(self.device)
         config = RunConfig(skill=skill_fields(one), seed=self.seed, stage=self.stage)
@@ -68,7 +68,7 @@ class Learn:
         return 0
 
     def _graph(self, one):
-        from ..learn import skill_graph
+        from ..skills.graph import skill_graph
 
         graph, notes = skill_graph(one, self.data)
         for note in notes:
@@ -94,8 +94,8 @@ class Learn:
             return folder.learn(samcon, show)
 
     def _summary(self, folder, events: bool) -> None:
-        from ..learning.log import read_rows
-        from ..learning.run import POLICY
+        from ..learning.runs.folder import POLICY
+        from ..learning.runs.log import read_rows
 
         if rows := read_rows(self.out):
             rate = sum(row["samples_per_second"] for row in rows) / len(rows)

@@ -25,8 +25,8 @@ class Info(ClipInput):
     """A table to read, or JSON with everything."""
 
     def run(self) -> int:
-        from ..clips import read_part
-        from ..sims.quality import examine
+        from ..clips.read import read_part
+        from ..sims.recording.quality import examine
 
         motion, notes = read_part(**self.reading())
         quality = examine(motion, self.frames[0])
@@ -46,8 +46,8 @@ class Joints(ClipInput):
     def run(self) -> int:
         import numpy as np
 
-        from ..clips import read_part
-        from ..sims import anatomy
+        from ..clips.read import read_part
+        from ..sims.recording import anatomy
 
         motion, notes = read_part(**self.reading())
         parts = {j: part for part, j in anatomy.parts(motion.joint_names, motion.parents).items()}

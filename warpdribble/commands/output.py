@@ -27,7 +27,7 @@ class Outputs:
 
 def check_outputs(out: Path) -> None:
     """Raise ValueError where the take or what goes beside it cannot be written."""
-    from ..take import check_writable
+    from ..takes.take import check_writable
 
     check_writable(out)
     for other in (".png", ".plots.png", ".html"):
@@ -38,10 +38,10 @@ def write_outputs(command: Outputs, model, run, source: str, root: str) -> None:
     """Write all of it and say where. run: a `simulate.Run`; source: where the motion comes from; root: what
     holds the root."""
     from .. import __version__
-    from ..plots import write_plots
-    from ..replay import write_replay
-    from ..sheet import write_sheet
-    from ..take import Take, validate, write_take
+    from ..takes.plots import write_plots
+    from ..takes.sheet import write_sheet
+    from ..takes.take import Take, validate, write_take
+    from ..web.page import write_replay
 
     take = Take.of(
         model,

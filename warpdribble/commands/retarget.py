@@ -22,12 +22,12 @@ class Retarget(ClipInput):
     """The player, or the path of an MJCF file with the same body names."""
 
     def run(self) -> int:
-        from ..clips import read_part
+        from ..clips.read import read_part
         from ..sims import Model
-        from ..sims.accuracy import accuracy
-        from ..sims.ball import inferred_ball, recorded_ball
-        from ..sims.mapping import find_mapping, read_mapping
-        from ..sims.retarget import retargeted
+        from ..sims.ball.ball import inferred_ball, recorded_ball
+        from ..sims.retarget.accuracy import accuracy
+        from ..sims.retarget.mapping import find_mapping, read_mapping
+        from ..sims.retarget.retarget import retargeted
 
         model = Model.load(self.model)
         motion, notes = read_part(**self.reading())
@@ -64,9 +64,9 @@ class Cycles(ClipInput):
     """How many to list."""
 
     def run(self) -> int:
-        from ..clips import read_part
-        from ..sims.cycles import find_cycles
-        from ..sims.mapping import read_mapping
+        from ..clips.read import read_part
+        from ..sims.retarget.cycles import find_cycles
+        from ..sims.retarget.mapping import read_mapping
 
         if not 0.05 <= self.shortest < self.longest <= 60.0:
             raise ValueError("--shortest and --longest: give rising times of 0.05 to 60 s")

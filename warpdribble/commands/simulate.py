@@ -74,13 +74,13 @@ def _check(command: Simulate | Demo) -> None:
 def _demo(command: Demo, model) -> int:
     import numpy as np
 
-    from ..author import dribble_right
-    from ..learning.disturbance import Disturbance
+    from ..learning.evaluate.steer import Steered
     from ..learning.graph import cyclic_graph
-    from ..learning.locomotion import Locomotion
-    from ..learning.run import Run
-    from ..learning.steer import Steered
-    from ..sims.reference import Cycle
+    from ..learning.runs.folder import Run
+    from ..learning.tasks.disturbance import Disturbance
+    from ..learning.tasks.locomotion import Locomotion
+    from ..sims.authored.dribble import dribble_right
+    from ..sims.reference.reference import Cycle
     from ..simulate import TRIES, ball_in_reference
 
     clip = dribble_right(model)
@@ -104,9 +104,9 @@ def _demo(command: Demo, model) -> int:
 
 
 def _simulate(command: Simulate, model) -> int:
-    from ..sims.reference import close_cycle
+    from ..sims.reference.reference import close_cycle
     from ..simulate import ball_from_hand, dribbling_hand, load_clip
-    from ..skills import is_skill
+    from ..skills.skill import is_skill
 
     if is_skill(command.clip):
         return _simulate_skill(command, model)
@@ -130,11 +130,11 @@ def _simulate(command: Simulate, model) -> int:
 
 
 def _simulate_skill(command: Simulate, model) -> int:
-    from ..play import play
     from ..simulate import ball_in_reference
-    from ..skills import skill
+    from ..skills.skill import read_skill
+    from ..skills.staged import stage_skill
 
-    one = play(model, skill(command.clip))
+    one = stage_skill(model, read_skill(command.clip))
     reference = one.reference
     say(f"skill     {one.skill.name}: {one.skill.description}, {reference.duration:.2f} s")
     for note in one.notes:

@@ -16,11 +16,11 @@ class List:
     """The skills that ship, and whether their clips are here."""
 
     def run(self) -> int:
-        from ..play import find_clip
-        from ..skills import SkillError, skill, skill_names
+        from ..skills.skill import SkillError, read_skill, skill_names
+        from ..skills.staged import find_clip
 
         for name in skill_names():
-            one = skill(name)
+            one = read_skill(name)
             where = f"authored {one.authored}"
             if one.clip:
                 where = f"{one.clip} {one.frames[0]}-{one.frames[1]}"
@@ -41,12 +41,12 @@ class Show:
     """Name of a shipped skill, or a .toml file."""
 
     def run(self) -> int:
-        from ..play import play
         from ..sims import Model
-        from ..skills import skill
+        from ..skills.skill import read_skill
+        from ..skills.staged import stage_skill
 
         model = Model.load("player")
-        one = play(model, skill(self.skill))
+        one = stage_skill(model, read_skill(self.skill))
         say(f"{one.skill.name}: {one.skill.description}")
         for note in one.notes:
             say(f"  {note}")
@@ -81,9 +81,9 @@ class Draft:
     """Names of the skeleton's joints, as for motion retarget."""
 
     def run(self) -> int:
-        from ..draft import draft, write_draft
         from ..sims import Model
-        from ..skills import parse_skill
+        from ..skills.draft import draft, write_draft
+        from ..skills.skill import parse_skill
 
         text = draft(Model.load("player"), self.clip, self.frames, self.name, self.mapping, self.whole)
         parse_skill(text, str(self.out))

@@ -1,0 +1,17 @@
+"""Clips written by our own code instead of recorded: what a fresh machine has without any download."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import lazily
+
+if TYPE_CHECKING:
+    from .catalogue import AUTHORED, authored_clip
+
+__all__ = ["AUTHORED", "authored_clip"]
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        ".catalogue": "AUTHORED authored_clip",
+    },
+)

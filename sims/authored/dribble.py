@@ -1,0 +1,237 @@
+"""A dribble written down instead of recorded: standing, right hand, in place, cyclic, the same
+every time.
+
+The ball comes first: it falls from the hand, bounces by the law of restitution, meets the hand
+again, and is carried up and pushed down so that it leaves as it did a cycle before. The hand stays
+on the ball while it has it. The rest of the body stands, leans, looks ahead and gives a little with
+every push; arms and legs are solved for hands and feet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from ..model import pose
+from ..reference.reference import Reference, resample_q, root_joint
+
+GRAVITY = 9.81
+HAND_YAW = np.radians(18.0)
+"""Of the fingers on the ball, from straight ahead toward the left."""
+
+
+@dataclass(frozen=True)
+class Dribble:
+    """Numbers of the authored dribble. Lengths in metres, times in seconds, angles in degrees,
+    speeds in m/s."""
+
+    period: float = 0.70
+    hold: float = 0.23
+    """How long the hand has the ball in a cycle."""
+    release_height: float = 0.75
+    """Of the ball's centre, where it leaves the hand."""
+    restitution: float = 0.8
+    lowest_palm: float = 0.755
+    """The hand follows through to here before it rises to meet the ball."""
+    ball_place: tuple[float, float] = (0.34, -0.27)
+    """Forward and left of the middle between the feet."""
+    pelvis_height: float = 0.84
+    pelvis_back: float = 0.07
+    give: float = 0.008
+    """Amplitude of the pelvis' bob."""
+    lean: tuple[float, float, float] = (12.0, 12.0, 11.0)
+    """Forward bend of pelvis, lower back and torso."""
+    gaze: float = 12.0
+    """Below the horizon."""
+    feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
+    """Left and right ankle: forward, left, turned out."""
+    curl: float = 1.0
+    """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
+    fingers: tuple[float, float] = (10.0, 34.0)
+    """Tilt of the fingers below the horizon, on the ball and after the release."""
+    roll: float = 3.5
+    """Of the palm on the ball, toward the left."""
+
+
+@dataclass(frozen=True)
+class AuthoredClip:
+    """A cyclic reference, its last row the first one again, and when the hand has the ball."""
+
+    reference: Reference
+    hand: str
+    """Body that dribbles."""
+    contact: tuple[float, float]
+    """[s] from the first row: the hand catches and releases the ball. The clip begins at a
+    release."""
+    lowest: float
+    """[s] from the first row: the hand is lowest."""
+    restitution: float
+
+
+def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
+    """The authored right-hand dribble on the player, at its time step; the ball's path is in its
+    coordinates.
+
+    Raises ValueError when no ball could do what the numbers ask for.
+    """
+    steps = round(style.period / model.timestep)
+    times = np.arange(steps + 1) * model.timestep
+    period = steps * model.timestep
+    style = replace(style, period=period)
+    ball_body = model.body("ball")
+    radius = next(s.size[0] for s in model.shapes if s.body == ball_body)
+    flight, ball_height, palm_height = stroke(style, radius)
+    phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
+
+    joint_q = np.tile(fingers(model, style.curl), (steps + 1, 1))
+    trunk(model, joint_q, style, phase)
+    legs(model, joint_q, style)
+    _left_arm(model, joint_q, phase)
+    under = np.tile([*style.ball_place, -radius], (steps + 1, 1))
+    under[:, 2] += palm_height(times % period)
+    snap = np.sin(np.pi * np.minimum(times % period / flight, 1.0) ** 0.7) ** 2
+    tilt = np.interp(snap, [0.0, 1.0], style.fingers)
+    _right_arm(model, joint_q, under, radius, np.radians(tilt), np.radians(style.roll))
+    ball = model.q_slice("ball")
+    joint_q[:, ball.start : ball.start + 2] = style.ball_place
+    joint_q[:, ball.start + 2] = ball_height(times % period)
+    joint_q[-1] = joint_q[0]
+    lowest = float(times[np.argmin(under[:, 2])])
+    return AuthoredClip(
+        Reference(joint_q, model.timestep), "r_hand", (flight, period), lowest, style.restitution
+    )
+
+
+def release_speed(style: Dribble, radius: float) -> float:
+    """The speed [m/s] at which the ball has to leave the hand for the cycle to close.
+
+    Raises ValueError when there is none.
+    """
+    speeds = np.linspace(0.2, 12.0, 119)
+    missed = np.array([_cycle(style, radius, v)[-1] for v in speeds])
+    change = np.flatnonzero((missed[:-1] < 0.0) != (missed[1:] < 0.0))
+    if not len(change):
+        raise ValueError("this dribble has no ball that comes back to the hand in time")
+    k = change[0]
+    return brentq(lambda v: _cycle(style, radius, v)[-1], speeds[k], speeds[k + 1])
+
+
+def _cycle(style: Dribble, radius: float, v: float):
+    """Time down and up, height and speed at the catch, growth of the push, height missed at the
+    end.
+
+    In flight the ball falls freely and leaves the ground with e times the speed it came with. In
+    the hand its acceleration is -g - k t: the push grows from nothing, so the hand never has to
+    pull.
+    """
+    fall = style.release_height - radius
+    impact = np.sqrt(v**2 + 2.0 * GRAVITY * fall)
+    down = (impact - v) / GRAVITY
+    up = style.period - style.hold - down
+    back = style.restitution * impact - GRAVITY * up
+    catch = radius + style.restitution * impact * up - 0.5 * GRAVITY * up**2
+    t = style.hold
+    k = 2.0 * (back + v - GRAVITY * t) / t**2
+    end = catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
+    return down, up, catch, back, k, end - style.release_height
+
+
+def stroke(style: Dribble, radius: float):
+    """Heights of the ball and of the palm as functions of the time since the release."""
+    v = release_speed(style, radius)
+    down, up, catch, back, k, _ = _cycle(style, radius, v)
+    if min(up, k) < 0.0:
+        raise ValueError("this dribble holds the ball too long to push it down")
+    flight = down + up
+    impact = v + GRAVITY * down
+
+    def carried(t):
+        t = np.maximum(t - flight, 0.0)
+        return catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
+
+    def ball(t):
+        falling = style.release_height - v * t - 0.5 * GRAVITY * t**2
+        since = t - down
+        rising = radius + style.restitution * impact * since - 0.5 * GRAVITY * since**2
+        return np.where(t < down, falling, np.where(t < flight, rising, carried(t)))
+
+    touch = style.release_height + radius
+    turn = 2.0 * (touch - style.lowest_palm) / v
+    empty = CubicHermiteSpline(
+        [0.0, turn, flight], [touch, style.lowest_palm, catch + radius], [-v, 0.0, back]
+    )
+
+    def palm(t):
+        return np.where(t < flight, empty(np.minimum(t, flight)), carried(t) + radius)
+
+    return flight, ball, palm
+
+
+def fingers(model, curl: float, sides: str = "r") -> np.ndarray:
+    """The start pose (nq,) with the fingers of these sides part of the way from flat to it."""
+    poses = np.stack([model.keyframes["flat"], model.start_q])
+    joint_q = np.array(model.start_q, dtype=float)
+    between = resample_q(model, poses, np.array([curl]))[0]
+    for joint in model.joint_names:
+        if joint[:2] in [f"{side}_" for side in sides] and joint.endswith(("_mcp", "_pip", "_dip")):
+            joint_q[model.q_slice(joint)] = between[model.q_slice(joint)]
+    return joint_q
+
+
+def trunk(model, joint_q, style: Dribble, phase) -> None:
+    root = model.q_slice(root_joint(model))
+    joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
+    joint_q[:, root.start + 1] = -0.01
+    joint_q[:, root.start + 2] = style.pelvis_height + style.give * np.cos(phase)
+    sway = 1.2 * np.cos(phase - 0.5)
+    for place, bend, yaw in (
+        (slice(root.start + 3, root.stop), style.lean[0], 1.0),
+        (model.q_slice("lower_back"), style.lean[1], 1.5),
+        (model.q_slice("torso"), style.lean[2], 1.5),
+        (model.q_slice("neck"), style.gaze - sum(style.lean), -4.0),
+    ):
+        angles = np.column_stack([yaw * np.sin(phase) - 1.0 * yaw, bend - sway, 0.0 * phase])
+        joint_q[:, place] = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
+
+
+def legs(model, joint_q, style: Dribble) -> None:
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    for side, (forward, left, out) in zip("lr", style.feet):
+        ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])
+        foot = Rotation.from_euler("z", out, degrees=True)
+        knee_axis = foot.apply([0.0, 1.0, 0.0])
+        pose.place_limb(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
+
+
+def _left_arm(model, joint_q, phase) -> None:
+    """Hangs beside the body, half bent in front, swinging a little against the push."""
+    upper, lower, _ = pose.limb_bodies(model, "l_elbow")
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    swing = np.radians(3.0) * np.sin(phase)
+    down = np.column_stack([np.sin(0.12 + swing), np.full_like(phase, 0.24), -np.cos(0.12 + swing)])
+    inward = np.tile([0.35, -1.0, 0.0], (len(phase), 1))
+    own = pose.frame_of(zero[lower] - zero[upper], model.joint_axis("l_elbow"))
+    parent = pose.forward(model, joint_q)[:, model.body_parent[upper], 3:]
+    turn = Rotation.from_quat(parent).inv() * pose.frame_of(down, inward) * own.inv()
+    joint_q[:, model.q_slice("l_shoulder")] = turn.as_quat()
+    joint_q[:, model.q_slice("l_elbow")] = np.radians(50.0) + swing[:, None]
+
+
+def _right_arm(model, joint_q, under, radius: float, tilt, roll: float) -> None:
+    """Palm down on a ball centred at `under` (frames, 3) [m], whether there is one or not.
+
+    The fingers point ahead, `tilt` (frames,) [rad] below the horizon.
+    """
+    hand = model.body("r_hand")
+    shape = next(s for s in model.shapes if s.body == hand)
+    centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
+    turn = Rotation.from_euler("ZYX", np.column_stack([0 * tilt + HAND_YAW, tilt, 0 * tilt + roll]))
+    turn = turn * Rotation.from_euler("z", 0.5 * np.pi)  # fingers, -Y in the zero pose, to +X
+    palm = under + radius * turn.apply([0.0, 0.0, 1.0])
+    wrist = palm - turn.apply(centre)
+    elbow_axis = np.array([0.35, -0.80, 0.50])
+    pose.place_limb(model, joint_q, "r_elbow", wrist, turn, elbow_axis)

@@ -1,0 +1,116 @@
+"""Targets that make a drive follow a reference: damping paid in advance, and the torques that carry
+the body.
+
+A drive gives kp (target - q) - kd qd. For it to give the torque tau while q moves as the reference
+does, the target has to be q + (kd qd + tau) / kp. The torques come from the bodies' weights and
+accelerations as point masses, and from the ground's force on the feet, which is what moves the
+centre of mass, where the zero moment point is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from ..model import gaps, pose
+from .reference import Reference, integrate, root_joint
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+SMOOTH = 8.0
+"""[Hz] Motion above this gives no torque: it is noise, or too short to matter."""
+STANDING = 0.04
+"""[m] A foot this far up carries nothing."""
+SHARE = 0.6
+"""Of a joint's effort limit that targets may ask for in advance; the rest corrects errors."""
+LEVER = 0.1
+"""[m] farthest that the ground's force acts from the middle of a foot."""
+
+
+def leading_targets(model, reference: Reference, feet=(), root_lead: float = 0.0) -> np.ndarray:
+    """Targets (frames, nq) for a reference.
+
+    feet: bodies that may stand on the ground; without them only the damping is paid. root_lead [s]:
+    damping over stiffness of a virtual drive of the root.
+    """
+    kp, kd = (np.array(model.tables[name], dtype=float) for name in ("dof_kp", "dof_kd"))
+    lead = np.divide(kd, kp, out=np.zeros_like(kd), where=kp > 0.0)
+    lead[model.dof_slice(root_joint(model))] = root_lead
+    ahead = lead * reference.velocity(model)
+    if feet:
+        torque = holding_torques(model, reference, feet)
+        ahead += np.divide(torque, kp, out=np.zeros_like(torque), where=kp > 0.0)
+    for name in model.joint_names:
+        if model.joint_type(name) != "free":
+            dofs = model.dof_slice(name)
+            effort = model.tables["link_effort"][model.joint_link[model.joint(name)]]
+            asked = np.linalg.norm(kp[dofs] * ahead[:, dofs], axis=1, keepdims=True)
+            ahead[:, dofs] *= np.minimum(1.0, SHARE * effort / np.maximum(asked, 1e-9))
+    return integrate(model, reference.joint_q, ahead)
+
+
+def holding_torques(model, reference: Reference, feet) -> np.ndarray:
+    """Joint torques (frames, nv) [N m] under which the reference carries itself; zero at free
+    joints."""
+    body_q = pose.forward(model, reference.joint_q)
+    root = pose.joint_body(model, root_joint(model))
+    own = gaps.descendants(model, root)
+    turns = [Rotation.from_quat(body_q[:, b, 3:]) for b in range(model.nbody)]
+    com = np.stack([body_q[:, b, :3] + turns[b].apply(model.body_com[b]) for b in own], axis=1)
+    push = model.body_mass[own, None] * (_acceleration(com, reference.timestep) - GRAVITY)
+    ground = _ground_forces(model, body_q, com, push, [model.body(f) for f in feet])
+
+    torque = np.zeros((reference.frame_count, model.nv))
+    for name in model.joint_names:
+        body = pose.joint_body(model, name)
+        if model.joint_type(name) == "free" or body not in own:
+            continue
+        beyond = gaps.descendants(model, body)
+        at = body_q[:, body, :3]
+        part = [own.index(b) for b in beyond]
+        needed = np.cross(com[:, part] - at[:, None], push[:, part]).sum(axis=1)
+        for foot, (place, force) in ground.items():
+            if foot in beyond:
+                needed -= np.cross(place - at, force)
+        local = turns[body].inv().apply(needed)
+        if model.joint_type(name) == "hinge":
+            local = local @ model.joint_axis(name)[:, None]
+        torque[:, model.dof_slice(name)] = local
+    return torque
+
+
+def _acceleration(places: np.ndarray, timestep: float) -> np.ndarray:
+    """Second derivative (frames, n, 3) of smoothed places."""
+    if len(places) < 32:
+        return np.zeros_like(places)
+    smooth = sosfiltfilt(butter(2, SMOOTH, fs=1.0 / timestep, output="sos"), places, axis=0)
+    return np.gradient(np.gradient(smooth, timestep, axis=0), timestep, axis=0)
+
+
+def _ground_forces(model, body_q, com, push, feet):
+    """Where (frames, 3) [m] and how hard (frames, 3) [N] the ground pushes each foot.
+
+    The whole force acts at the zero moment point; it is shared by the feet that are down, in the
+    ratio that puts the point between them.
+    """
+    force = push.sum(axis=1)
+    moment = np.cross(com, push).sum(axis=1)
+    up = np.maximum(force[:, 2:], 1.0)
+    point = np.concatenate([-moment[:, 1:2] / up, moment[:, :1] / up, 0.0 * up], axis=1)
+    middles, down = [], []
+    for foot in feet:
+        shape = next(s for s in model.shapes if s.body == foot)
+        middle = body_q[:, foot, :3] + Rotation.from_quat(body_q[:, foot, 3:]).apply(shape.pos)
+        middles.append(middle * [1.0, 1.0, 0.0])
+        low = gaps.lowest_point(model, body_q, gaps.descendants(model, foot))
+        down.append(np.clip(1.5 - low / STANDING, 0.0, 1.0))
+    down = np.array(down)
+    if len(feet) == 2:
+        across = middles[1] - middles[0]
+        share = np.sum((point - middles[0]) * across, axis=1) / np.sum(across**2, axis=1)
+        down = down * [np.clip(1.0 - share, 0.02, 1.0), np.clip(share, 0.02, 1.0)]
+    share = down / np.maximum(down.sum(axis=0), 1e-9)
+    off = point - sum(s[:, None] * m for s, m in zip(share, middles))
+    off *= np.minimum(1.0, LEVER / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-9))
+    loaded = force * (force[:, 2:] > 0.0)
+    return {foot: (middle + off, s[:, None] * loaded) for foot, middle, s in zip(feet, middles, share)}

@@ -1,0 +1,124 @@
+"""How well a motion sits on a model: distance of joints from the scaled recording, sliding and sinking feet,
+joints at their limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..model import gaps, pose
+from .planting import find_foot
+from .reach import joint_range
+from .retarget import Retargeted
+
+ON_GROUND = 0.005
+"""[m] A point of the sole this low carries."""
+LIMBS = {
+    "trunk": ("torso", "head"),
+    "hips": ("upper_leg",),
+    "knees": ("lower_leg",),
+    "feet": ("foot",),
+    "shoulders": ("upper_arm",),
+    "elbows": ("lower_arm",),
+    "hands": ("hand",),
+}
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Errors of a retargeted motion. Lengths in metres."""
+
+    limbs: dict[str, tuple[float, float]]
+    """Limb -> mean and 95th percentile of its joints' distance from the recording."""
+    mean: float
+    """Over all joints and frames."""
+    sliding: float
+    """[m/s], mean horizontal speed of standing feet: of the slowest of the sole's points that touch the
+    ground, as a foot that rolls or pivots has one at rest."""
+    sliding_all: float
+    """[m/s], the same as a mean over all points that touch, rolling and pivoting included; the
+    point under the toe joint is left out, as it is of no shape."""
+    sliding_worst: float
+    """[m/s], 99th percentile of the same."""
+    penetration: float
+    """Deepest that any point of the feet is under the ground."""
+    body_penetration: float
+    """Deepest that any point of the whole body is under the ground."""
+    off_ground: float
+    """Mean height of a standing foot's lowest point: feet that are said to stand and do not."""
+    standing: float
+    """Share of frames with a foot on the ground."""
+    limits: float
+    """[rad] farthest that any joint is beyond its range."""
+
+
+def accuracy(model, result: Retargeted) -> Accuracy:
+    joint_q = result.reference.joint_q
+    body_q = pose.forward(model, joint_q)
+    errors = {
+        body: np.linalg.norm(body_q[:, model.body(body), :3] - goal, axis=1)
+        for body, goal in result.goals.items()
+    }
+    limbs = {}
+    for limb, ends in LIMBS.items():
+        part = [e for body, e in errors.items() if body.removeprefix("l_").removeprefix("r_") in ends]
+        if part:
+            limbs[limb] = (float(np.mean(part)), float(np.quantile(part, 0.95)))
+    slides, strict, lows = [], [], []
+    deepest, stood = 0.0, np.zeros(len(joint_q), bool)
+    for name, stands in result.stands.items():
+        foot = find_foot(model, name)
+        points = sole_points(foot, body_q)
+        deepest = max(deepest, -float(points[..., 2].min()))
+        for stand in stands:
+            part = points[stand.first : stand.last + 1]
+            stood[stand.first : stand.last + 1] = True
+            lows.append(np.maximum(part[..., 2].min(axis=1), 0.0))
+            touch = (part[:-1, :, 2] < ON_GROUND) & (part[1:, :, 2] < ON_GROUND)
+            speed = np.linalg.norm(np.diff(part[..., :2], axis=0), axis=2) / model.timestep
+            strict.append(speed[:, :-1][touch[:, :-1]])
+            speed = np.where(touch, speed, np.inf).min(axis=1)
+            slides.append(speed[touch.any(axis=1)])
+    slide = np.concatenate(slides) if slides else np.zeros(1)
+    slide = slide if len(slide) else np.zeros(1)
+    every = np.concatenate(strict) if strict else np.zeros(1)
+    root = gaps.descendants(model, 0)
+    return Accuracy(
+        limbs=limbs,
+        mean=float(np.mean(list(errors.values()))),
+        sliding=float(slide.mean()),
+        sliding_all=float(every.mean()) if len(every) else 0.0,
+        sliding_worst=float(np.quantile(slide, 0.99)),
+        penetration=deepest,
+        body_penetration=max(0.0, -float(gaps.lowest_point(model, body_q, root).min())),
+        off_ground=float(np.concatenate(lows).mean()) if lows else 0.0,
+        standing=float(stood.mean()),
+        limits=beyond_limits(model, joint_q),
+    )
+
+
+def sole_points(foot, body_q: np.ndarray) -> np.ndarray:
+    """Points of the sole (frames, 7, 3) [m]: corners of the foot's box, lowest points of the toes' ends, and
+    the point under the toe joint, about which a foot pivots."""
+    turn = Rotation.from_quat(body_q[:, foot.body, 3:])
+    points = [body_q[:, foot.body, :3] + turn.apply(corner) for corner in foot.corners]
+    turn = Rotation.from_quat(body_q[:, foot.toes, 3:])
+    down = np.array([0.0, 0.0, foot.drop])
+    points += [body_q[:, foot.toes, :3] + turn.apply(tip) - down for tip in (*foot.tips, np.zeros(3))]
+    return np.stack(points, axis=1)
+
+
+def beyond_limits(model, joint_q: np.ndarray) -> float:
+    """[rad] farthest that any joint of joint_q (frames, nq) is beyond its range."""
+    worst = 0.0
+    for joint in model.joint_names:
+        place, kind = model.q_slice(joint), model.joint_type(joint)
+        low, high = joint_range(model, joint)
+        if kind == "hinge":
+            angle = joint_q[:, place]
+            worst = max(worst, float((angle - high).max()), float((low - angle).max()))
+        elif kind == "ball":
+            worst = max(worst, float(Rotation.from_quat(joint_q[:, place]).magnitude().max() - high))
+    return worst

@@ -1,0 +1,181 @@
+"""Which joint of a recording is which body of the player: mapping files (TOML), shipped and a user's own."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Literal
+
+from ...assets import path as asset
+from ..recording.motion import Motion
+
+SHIPPED = ("cmu", "ballplay", "mixamo", "lafan")
+
+
+class MappingError(ValueError):
+    """A mapping that cannot be used; the message is one line with the file, the key and the reason."""
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """One kind of skeleton. Names on the left are the model's, on the right the recording's."""
+
+    name: str
+    """Shipped name, or the file's path."""
+    bodies: dict[str, str]
+    """Body -> joint whose rotation it follows."""
+    arms: dict[str, tuple[str, str, str]]
+    """Elbow hinge -> joints at the shoulder, the elbow and the wrist."""
+    legs: dict[str, tuple[str, str, str]]
+    """Knee hinge -> joints at the hip, the knee and the ankle; their lengths set the scale."""
+    points: dict[str, str] = field(default_factory=dict)
+    """Further bodies whose origin lies where that joint is; limbs are known from `arms` and `legs`."""
+    palms: dict[str, tuple[str, str, str, str]] = field(default_factory=dict)
+    """Hand -> wrist, index, middle and little knuckle, whose places are trusted more than rotations."""
+    smoothed: dict[str, float] = field(default_factory=dict)
+    """Body -> cut-off [Hz] of a low-pass filter, for joints the recording shows with noise."""
+    prefix: str = ""
+    """What may stand before every joint's name in the recording."""
+    rest: Literal["recorded", "directions"] = "recorded"
+    """The T-pose: as the motion has it, or built from the directions of its bones."""
+    description: str = ""
+
+    @property
+    def limbs(self) -> dict[str, tuple[str, str, str]]:
+        return self.legs | self.arms
+
+    def joints(self) -> dict[str, str]:
+        """Joint of the recording -> the key of the file that names it."""
+        named = {joint: f"bodies.{body}" for body, joint in self.bodies.items()}
+        for table in ("points", "arms", "legs", "palms"):
+            for key, joints in getattr(self, table).items():
+                for joint in (joints,) if isinstance(joints, str) else joints:
+                    named.setdefault(joint, f"{table}.{key}")
+        return named
+
+    def plain(self, motion: Motion) -> Motion:
+        """The motion with the names of this mapping (prefix taken off). Raises MappingError for a joint
+        that is not in it."""
+        from dataclasses import replace
+
+        names = tuple(n.removeprefix(self.prefix) for n in motion.joint_names)
+        for joint, key in self.joints().items():
+            if joint not in names:
+                raise MappingError(
+                    f"{self.name}: {key}: no joint '{joint}' in this motion; it has {', '.join(names)}"
+                )
+        return replace(motion, joint_names=names)
+
+    def fits(self, motion: Motion) -> bool:
+        """Whether the motion has every joint that is named here."""
+        names = {n.removeprefix(self.prefix) for n in motion.joint_names}
+        return names >= set(self.joints())
+
+    def check_model(self, model) -> None:
+        """Raise MappingError for a body or hinge that the model does not have."""
+        for table, there in (
+            ("bodies", model.body_names),
+            ("points", model.body_names),
+            ("palms", model.body_names),
+            ("smoothed", model.body_names),
+            ("arms", model.joint_names),
+            ("legs", model.joint_names),
+        ):
+            for key in getattr(self, table):
+                if key not in there:
+                    what = "joint" if table in ("arms", "legs") else "body"
+                    raise MappingError(
+                        f"{self.name}: {table}.{key}: the model has no {what} '{key}'; "
+                        f"it has {', '.join(there)}"
+                    )
+
+
+def read_mapping(name: str | Path) -> Mapping:
+    """A shipped mapping by name, or a file by path. Raises MappingError."""
+    if str(name) in SHIPPED:
+        return parse_mapping(asset(f"mappings/{name}.toml").read_text(), str(name))
+    path = Path(name)
+    if path.suffix.lower() != ".toml":
+        raise MappingError(f"{name}: a mapping is {', '.join(SHIPPED)}, or the path of a .toml file")
+    try:
+        return parse_mapping(path.read_text(encoding="utf-8"), str(name))
+    except FileNotFoundError:
+        raise MappingError(f"{name}: no such file") from None
+    except UnicodeDecodeError:
+        raise MappingError(f"{name}: not a TOML file (binary data)") from None
+    except OSError as error:
+        raise MappingError(f"{name}: {error.strerror or error}") from None
+
+
+def parse_mapping(text: str, name: str) -> Mapping:
+    """A mapping from the text of its file. Raises MappingError naming the file, the key and the reason."""
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise MappingError(f"{name}: not TOML: {' '.join(str(error).split())}") from None
+    known = {f.name for f in fields(Mapping)} - {"name"}
+    for key in data:
+        if key not in known:
+            raise MappingError(f"{name}: {key}: unknown key; there are {', '.join(sorted(known))}")
+    out: dict = {"name": name}
+    for key in ("bodies", "arms", "legs"):
+        if not data.get(key):
+            raise MappingError(f"{name}: {key}: missing")
+    for key, value in data.items():
+        if key in ("prefix", "description", "rest"):
+            _expect(isinstance(value, str), name, key, "should be a text")
+            out[key] = value
+        else:
+            _expect(isinstance(value, dict), name, key, "should be a table")
+            out[key] = {k: _entry(name, key, k, v) for k, v in value.items()}
+    _expect(out.get("rest", "recorded") in ("recorded", "directions"), name, "rest", "recorded or directions")
+    return Mapping(**out)
+
+
+def find_mapping(motion: Motion) -> Mapping:
+    """The shipped mapping that names joints of this motion only. Raises MappingError when none does."""
+    for name in SHIPPED:
+        mapping = read_mapping(name)
+        if mapping.fits(motion) and (name != "mixamo" or not _bones_along_x(motion)):
+            return mapping
+    has = {n.rpartition(":")[2] for n in motion.joint_names} | set(motion.joint_names)
+    missing = {name: sorted(set(read_mapping(name).joints()) - has) for name in SHIPPED}
+    near = min(SHIPPED, key=lambda name: len(missing[name]))
+    lacks = f"{', '.join(missing[near][:4])}{', ...' if len(missing[near]) > 4 else ''}"
+    raise MappingError(
+        f"unknown joints: of the shipped mappings {near} comes nearest, and lacks {lacks}; "
+        f"write one and give it. The motion has {', '.join(motion.joint_names[:8])}"
+        f"{', ...' if len(motion.joint_names) > 8 else ''}"
+    )
+
+
+def _bones_along_x(motion: Motion) -> bool:
+    """LAFAN1 and Mixamo share their joints' names; in LAFAN1 thigh, shank and upper arm all lie along one
+    axis of their joint."""
+    names = ("LeftLeg", "LeftFoot", "RightLeg", "RightFoot", "LeftForeArm", "RightForeArm")
+    offsets = motion.offsets[[motion.joint_names.index(n) for n in names if n in motion.joint_names]]
+    if len(offsets) < len(names):
+        return False
+    directions = offsets / ((offsets**2).sum(axis=1, keepdims=True) ** 0.5 + 1e-12)
+    return float((directions @ directions[0]).min()) > 0.98
+
+
+def _entry(name: str, table: str, key: str, value):
+    place = f"{table}.{key}"
+    if table == "smoothed":
+        number = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1e4
+        _expect(number, name, place, "should be a frequency in Hz")
+        return float(value)
+    if table in ("bodies", "points"):
+        _expect(isinstance(value, str), name, place, "should be the name of a joint")
+        return value
+    count = 4 if table == "palms" else 3
+    named = isinstance(value, list) and len(value) == count and all(isinstance(v, str) for v in value)
+    _expect(named, name, place, f"should be a list of {count} names of joints")
+    return tuple(value)
+
+
+def _expect(true: bool, name: str, key: str, reason: str) -> None:
+    if not true:
+        raise MappingError(f"{name}: {key}: {reason}")

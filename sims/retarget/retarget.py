@@ -1,0 +1,214 @@
+"""From a recorded skeleton to a model: rotations of corresponding joints are copied (P1 7.1), then feet are
+kept where they stood and hands brought where they were.
+
+What is copied is how far each segment has turned from the T-pose, seen in the world, so that joints
+between the named ones are composed on the way and the two skeletons' joint frames need not agree.
+Places are the recording's, scaled by the length of the legs, with the ground brought to z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from ..model import gaps, pose
+from ..recording.motion import Motion
+from ..reference.reference import Reference, root_joint
+from .calibrate import match_limbs, rest_by_directions, since_rest
+from .mapping import Mapping, find_mapping
+from .planting import Foot, Stand, find_foot, find_stands, planted, sole_heights
+from .reach import elbow_axis, keep_range, lift_out, lower_root, reach, shrug
+
+GROUND = (1.6, 0.3)
+"""[s] The ground is the lowest that the soles come within the first time, smoothed over the second."""
+
+
+@dataclass(frozen=True)
+class Retargeted:
+    """A motion on a model, and what it is to be compared with."""
+
+    reference: Reference
+    mapping: Mapping
+    scale: float
+    """[-] of all the recording's lengths."""
+    goals: dict[str, np.ndarray]
+    """Body -> (frames, 3) [m], where the recording has its origin, scaled, over ground at z = 0."""
+    ground: np.ndarray
+    """(frames,) [m] height of the ground in the scaled recording, taken off."""
+    stands: dict[str, list[Stand]] = field(default_factory=dict)
+    """Foot -> its stands."""
+    lowered: np.ndarray | None = None
+    """(frames,) [m] by which the root went down for the legs to reach."""
+
+
+def retarget(model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Reference:
+    """The motion on the model at the model's time step; see `retargeted`."""
+    return retargeted(model, motion, mapping, ik).reference
+
+
+def retargeted(model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Retargeted:
+    """The motion on the model, resampled to a whole number of its steps, the ground at z = 0.
+
+    mapping: None takes the shipped one that fits. ik: False copies rotations only. Bodies the mapping does
+    not name keep the angles of the model's start pose (fingers, the ball). Raises MappingError (a
+    ValueError) for a joint or body that is not there.
+    """
+    mapping = mapping or find_mapping(motion)
+    mapping.check_model(model)
+    motion = mapping.plain(motion).resample(1.0 / model.timestep)
+    if mapping.rest == "directions":
+        motion = rest_by_directions(model, motion, mapping)
+    positions = motion.positions if motion.positions is not None else motion.forward()[0]
+    scale = leg_scale(model, motion, mapping)
+    goals = {b: scale * positions[:, motion.index(j)] for b, j in goal_joints(model, mapping).items()}
+
+    turned = _body_rotations(model, motion, positions, mapping)
+    joint_q = np.tile(np.asarray(model.start_q, dtype=float), (motion.frame_count, 1))
+    joint_q[:, model.q_slice(root_joint(model))] = _root(model, goals, mapping, turned)
+    _fill_joints(model, joint_q, turned)
+    feet = {model.body_names[pose.limb_bodies(model, knee)[2]]: knee for knee in mapping.legs}
+    ground = _ground(model, joint_q, goals, feet)
+    joint_q[:, model.q_slice(root_joint(model)).start + 2] -= ground
+    goals = {body: goal - ground[:, None] * [0.0, 0.0, 1.0] for body, goal in goals.items()}
+    out = Retargeted(Reference(joint_q, model.timestep), mapping, scale, goals, ground)
+    return _with_ik(model, out, feet) if ik else out
+
+
+def goal_joints(model, mapping: Mapping) -> dict[str, str]:
+    """Body of the model -> joint of the recording that lies at its origin."""
+    named = dict(mapping.points)
+    for hinge, joints in mapping.limbs.items():
+        named |= {model.body_names[b]: j for b, j in zip(pose.limb_bodies(model, hinge), joints)}
+    return named
+
+
+def leg_scale(model, motion: Motion, mapping: Mapping) -> float:
+    """[-] length of the model's legs over the recorded person's."""
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    own = theirs = 0.0
+    for knee, joints in mapping.legs.items():
+        bodies = pose.limb_bodies(model, knee)
+        for (a, b), joint in zip(pairwise(bodies), joints[1:]):
+            own += np.linalg.norm(zero[b] - zero[a])
+            theirs += np.linalg.norm(motion.offsets[motion.index(joint)])
+    return float(own / theirs)
+
+
+def _with_ik(model, out: Retargeted, feet: dict[str, str]) -> Retargeted:
+    joint_q = out.reference.joint_q
+    body_q = pose.forward(model, joint_q)
+    stands, paths = {}, {}
+    for name in feet:
+        foot = find_foot(model, name)
+        turn = Rotation.from_quat(body_q[:, foot.body, 3:])
+        stands[name] = find_stands(foot, out.goals[name], turn, model.timestep)
+        paths[name] = planted(foot, out.goals[name], turn, stands[name])
+    lowered = lower_root(model, joint_q, {feet[name]: paths[name][0] for name in feet})
+    for name, knee in feet.items():
+        _place_foot(model, joint_q, find_foot(model, name), knee, *paths[name])
+    body_q = pose.forward(model, joint_q)
+    for elbow in out.mapping.arms:
+        upper, lower, hand = pose.limb_bodies(model, elbow)
+        places = [out.goals[model.body_names[b]] for b in (upper, lower, hand)]
+        shrug(model, joint_q, upper, places[0])
+        axis = elbow_axis(model, joint_q, elbow, *places[1:])
+        turn = Rotation.from_quat(body_q[:, hand, 3:])
+        reach(model, joint_q, elbow, places[2], turn, axis)
+        lift_out(model, joint_q, elbow, places[2], gaps.descendants(model, hand))
+    return Retargeted(out.reference, out.mapping, out.scale, out.goals, out.ground, stands, lowered)
+
+
+def _place_foot(model, joint_q: np.ndarray, foot: Foot, knee: str, place, turn: Rotation, toes) -> None:
+    """Bring a leg to its foot's path, in place; a foot that the ankle's range turns into the ground goes
+    that much higher."""
+    joint_q[:, model.q_slice(foot.toe_joint)] = toes[:, None]
+    keep_range(model, joint_q, foot.toe_joint)
+    reach(model, joint_q, knee, place, turn)
+    lift_out(model, joint_q, knee, place, [foot.body, foot.toes])
+
+
+def _ground(model, joint_q: np.ndarray, goals, feet) -> np.ndarray:
+    """Height (frames,) [m] of the ground under the recording: constant where the clip is short, else
+    following what the soles come down to, of our feet on the recording's ankles."""
+    body_q = pose.forward(model, joint_q)
+    low = []
+    for name in feet:
+        foot = find_foot(model, name)
+        turn = Rotation.from_quat(body_q[:, foot.body, 3:])
+        low.append(sole_heights(foot, goals[name], turn).min(axis=1))
+    low = gaussian_filter1d(np.min(low, axis=0), 0.03 / model.timestep, mode="nearest")
+    rows = round(GROUND[0] / model.timestep)
+    ground = minimum_filter1d(low, min(rows, len(low)), mode="nearest")
+    return gaussian_filter1d(ground, GROUND[1] / model.timestep, mode="nearest")
+
+
+def _body_rotations(model, motion: Motion, positions, mapping: Mapping) -> dict[str, Rotation]:
+    """World rotation of each mapped body of the model: turn of the recorded joint since the T-pose, times
+    the match."""
+    match, since = match_limbs(model, motion, mapping), since_rest(motion)
+    turned = {}
+    for body, joint in mapping.bodies.items():
+        turned[body] = since(joint) * match.get(body, Rotation.identity())
+        if body in mapping.palms:
+            turned[body] = _palm(model, body, [positions[:, motion.index(j)] for j in mapping.palms[body]])
+        if body in mapping.smoothed:
+            turned[body] = _smooth(turned[body], mapping.smoothed[body], motion.rate)
+    return turned
+
+
+def _palm(model, hand: str, places) -> Rotation:
+    """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]."""
+    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    side = hand.removesuffix("hand")
+    own = [zero[model.body(hand)]] + [zero[model.body(f"{side}{f}_1")] for f in ("index", "middle", "pinky")]
+    wrist, index, middle, little = places
+    now = pose.frame_of(middle - wrist, index - little)
+    return now * pose.frame_of(own[2] - own[0], own[1] - own[3]).inv()
+
+
+def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> None:
+    """Joint coordinates of the bodies in `turned`, in place; hinges take the angle nearest to the copied
+    rotation, all stay within their range.
+
+    A joint's own rotation is what brings its body, now at the zero angle, to the wanted world rotation.
+    """
+    zero = pose.zero_q(model)
+    for body, name in enumerate(model.body_names):
+        if name not in turned or model.body_parent[body] < 0:
+            continue
+        joint = pose.body_joint(model, body)
+        q = model.q_slice(joint)
+        joint_q[:, q] = zero[q]
+        now = Rotation.from_quat(pose.forward(model, joint_q)[:, body, 3:])
+        wanted = now.inv() * turned[name]
+        if model.joint_type(joint) == "ball":
+            joint_q[:, q] = wanted.as_quat()
+        else:
+            joint_q[:, q] += pose.twist(wanted, model.joint_axis(joint))[:, None]
+        keep_range(model, joint_q, joint)
+
+
+def _root(model, goals, mapping: Mapping, turned) -> np.ndarray:
+    """Root poses (frames, 7): the middle of the hips is where the scaled recording has it."""
+    zero = pose.forward(model, pose.zero_q(model))[0]
+    hips = [pose.limb_bodies(model, knee)[0] for knee in mapping.legs]
+    middle = np.mean([goals[model.body_names[b]] for b in hips], axis=0)
+    root = pose.joint_body(model, root_joint(model))
+    facing = turned[model.body_names[root]]
+    position = middle - facing.apply(zero[hips, :3].mean(axis=0) - zero[root, :3])
+    return np.concatenate([position, facing.as_quat()], axis=1)
+
+
+def _smooth(turns: Rotation, cut_off: float, rate: float) -> Rotation:
+    """Low-pass filter of rotations, forward and backward so that nothing is delayed."""
+    if len(turns) < 16 or cut_off >= 0.45 * rate:
+        return turns
+    middle = turns.mean()
+    steps = (middle.inv() * turns).as_rotvec()
+    filtered = sosfiltfilt(butter(2, cut_off, fs=rate, output="sos"), steps, axis=0)
+    return middle * Rotation.from_rotvec(filtered)

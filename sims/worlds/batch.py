@@ -1,0 +1,266 @@
+"""`Batch`: how many worlds lie in memory, and how kernels are launched over them."""
+
+from __future__ import annotations
+
+import os
+import platform
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+
+from ... import kernels
+from ..model.model import Model
+
+RESPONSE_ROOM = 1365
+"""Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
+
+
+CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
+"""State that a step hands to the next."""
+
+
+def widest_lanes() -> int:
+    """Worlds that one vector register of this processor holds."""
+    machine = platform.machine().lower()
+    if machine in ("aarch64", "arm64"):
+        return 4
+    try:
+        flags = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return 8 if machine in ("x86_64", "amd64") else 4
+    return 16 if "avx512f" in flags else 8 if "avx2" in flags else 4
+
+
+def find_device(name: str) -> wp.Device:
+    """Warp's device of that name. Raises ValueError with those that there are."""
+    try:
+        return wp.get_device(name)
+    except (ValueError, RuntimeError):
+        there = ", ".join(str(device) for device in wp.get_devices())
+        raise ValueError(f"no device {name!r} here; there are: {there}") from None
+
+
+class Batch:
+    """Worlds in groups of `lanes`: a group is what one pass of a kernel steps.
+
+    State arrays are `(groups, n)`. On a CPU a group's row is contiguous, each number being a vector of
+    its worlds; on CUDA a group is one world, and neighbouring worlds lie side by side.
+    """
+
+    def __init__(self, model: Model, world_count: int, device: str, threads: int | None, lanes: int | None):
+        if world_count < 1:
+            raise ValueError(f"world_count must be at least 1, not {world_count}")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads must be at least 1, not {threads}")
+        self.model = model
+        self.world_count = world_count
+        self.device = find_device(device)
+        on_cpu = self.device.is_cpu
+        self.lanes = lanes or (widest_lanes() if on_cpu else 1)
+        if not on_cpu and self.lanes != 1:
+            raise ValueError("lanes are for the CPU; on CUDA leave them out")
+        self._side_by_side = not on_cpu
+        self._program = kernels.program(self.lanes)
+        self._observer = kernels.program(self.lanes, "observe")
+        self._exchange = kernels.program(self.lanes, "exchange")
+        self.groups = -(-world_count // self.lanes)
+        self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
+        self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
+        self._loaded: set = set()
+        self._tree = self._make_tree()
+        self._world = self._make_world()
+        self._fill_defaults()
+
+    def _make_tree(self):
+        """The model as the kernels' `Tree`."""
+        program, model = self._program, self.model
+        tree = program.Tree()
+        for name, var in program.Tree.vars.items():
+            if isinstance(var.type, wp.array):
+                rows = model.tables.get(name, np.zeros(0))
+                rows = np.asarray(rows, np.int32 if var.type.dtype is wp.int32 else np.float32)
+                setattr(tree, name, wp.array(rows, dtype=var.type.dtype, device=self.device))
+        tree.h = model.timestep
+        tree.gravity = wp.vec3(*model.tables["gravity"])
+        tree.link_count = len(model.tables["link_parent"]) - 1
+        tree.q_count, tree.dof_count = model.nq, model.nv
+        tree.slot_count = len(model.tables.get("slot_kind", ()))
+        tree.flight_count = len(model.tables.get("flight_link", ()))
+        tree.forced = 0
+        lengths = model.tables.get("slot_length", np.zeros(0, int))
+        tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
+        return tree
+
+    def _make_world(self):
+        """State of all worlds, `(groups, n)` each."""
+        program, model, tree = self._program, self.model, self._tree
+        links = tree.link_count + 1
+        longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + program.HEAD
+        counts = dict.fromkeys(("q", "target"), model.nq)
+        counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
+        counts |= dict.fromkeys(("mass_scale", "turn", "R", "pos", "r", "V", "A", "I", "p"), links)
+        counts |= dict.fromkeys(("pull", "torque", "full", "touched", "knock"), links)
+        counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
+        counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
+        counts |= dict.fromkeys(("broken", "fallen", "fumbled", "hurried"), 1)
+        counts |= {
+            "force": model.nbody,
+            "y": tree.response_room + longest,
+            "active": 2 * tree.slot_count + 2,
+        }
+        world = program.World()
+        types = {name: var.type.dtype for name, var in program.World.vars.items()}
+        for name in types.keys() - set(CARRIED):
+            setattr(world, name, self._allocate(counts[name], types[name]))
+        self._lay_out(world, {name: (counts[name], types[name]) for name in CARRIED})
+        return world
+
+    def _lay_out(self, world, arrays: dict) -> None:
+        """Arrays, `(count, type)` by name, one after the other in `_carried`, so that a world's state moves
+        in one go."""
+        lanes, groups = self.lanes, self.groups
+        blocks, start = [], 0
+        for count, dtype in arrays.values():
+            count = max(count, 1)
+            parts = wp.types.type_size_in_bytes(dtype) // (4 * lanes)
+            strides = (count * parts * lanes, parts * lanes)
+            if self._side_by_side:
+                strides = (parts, groups * parts)
+            blocks.append((start, count, parts, *strides))
+            start += groups * count * parts * lanes
+        self._carried = wp.zeros(start, dtype=float, device=self.device)
+        for (name, (_, dtype)), (start, count, *_) in zip(arrays.items(), blocks):
+            shape = (count, groups) if self._side_by_side else (groups, count)
+            array = wp.array(ptr=self._carried.ptr + 4 * start, dtype=dtype, shape=shape, device=self.device)
+            array._ref = self._carried  # as Warp's own views keep what they show
+            setattr(world, name, array.transpose() if self._side_by_side else array)
+        block = self._exchange.Block
+        table = np.array(blocks, np.int32).view(block.numpy_dtype()).ravel()
+        self._blocks = wp.array(table, dtype=block, device=self.device)
+
+    def _allocate(self, count: int, dtype) -> wp.array:
+        """Zeros `(groups, count)`."""
+        shape = (self.groups, max(count, 1))
+        if self._side_by_side:
+            return wp.zeros(shape[::-1], dtype=dtype, device=self.device).transpose()
+        return wp.zeros(shape, dtype=dtype, device=self.device)
+
+    def _fill_defaults(self) -> None:
+        pairs = self.model.pairs
+        everyone = np.arange(self.world_count)
+        self._write("mass_scale", everyone, np.ones(self._tree.link_count + 1))
+        for name in ("friction", "restitution"):
+            if pairs:
+                self._write(name, everyone, np.array([pair[name] for pair in pairs]))
+        ground = np.array([0, 0, 0, 1], np.float32)
+        self._write("turn", everyone, ground, column=0)
+        self._write("R", everyone, np.eye(3, dtype=np.float32).ravel(), column=0)
+
+    def _rows(self, array: wp.array) -> np.ndarray:
+        """An array as float32 `(groups, n, parts, lanes)`: on a CPU a view, on CUDA a copy."""
+        rows = array.numpy()
+        if self._side_by_side:
+            rows = np.ascontiguousarray(rows)
+        rows = rows.view(np.float32) if rows.dtype.fields else rows
+        return rows.reshape(self.groups, array.shape[1], -1, self.lanes)
+
+    def _read(self, array: wp.array) -> np.ndarray:
+        """`(world_count, n, parts)` of an array, parts dropped where there is one."""
+        rows = self._rows(array).transpose(0, 3, 1, 2)
+        rows = rows.copy()  # never a view of what the next step changes
+        rows = rows.reshape(-1, *rows.shape[2:])[: self.world_count]
+        return rows[..., 0] if rows.shape[-1] == 1 else rows
+
+    def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
+        """Set a state array of some worlds, or one column of it: `values` `(..., n * parts)`, for each
+        world or for all. The unused worlds of the last group follow the last world."""
+        array = getattr(self._world, name)
+        if column is not None:
+            array = array[:, column : column + 1]
+        n, parts = array.shape[1], wp.types.type_size_in_bytes(array.dtype) // (4 * self.lanes)
+        values = np.asarray(values, np.float32)
+        if values.ndim:
+            values = values.reshape(-1, n, parts)
+        values = np.broadcast_to(values, (len(worlds), n, parts))
+        count = self.groups * self.lanes
+        if len(worlds) == count and (worlds == np.arange(count)).all():  # all of them: the old do not count
+            rows = values.reshape(self.groups, self.lanes, n, parts).transpose(0, 2, 3, 1)
+        else:
+            rows = self._rows(array)
+            last = np.flatnonzero(worlds == self.world_count - 1)
+            if len(last):
+                spare = np.arange(self.world_count, count)
+                worlds = np.concatenate([worlds, spare])
+                values = np.concatenate([values, np.repeat(values[last[-1:]], len(spare), 0)])
+            group, lane = np.divmod(worlds, self.lanes)
+            rows[group, :, :, lane] = values
+        self._assign(array, rows)
+
+    def _assign(self, array: wp.array, rows: np.ndarray) -> None:
+        """Set an array to float32 `(groups, n, parts, lanes)`, as `_rows` gives them."""
+        if not self._side_by_side:
+            there = self._rows(array)
+            if not np.shares_memory(there, rows):
+                there[:] = rows
+            return
+        structured = hasattr(array.dtype, "numpy_dtype")
+        dtype = array.dtype.numpy_dtype() if structured else np.float32
+        array.assign(np.ascontiguousarray(rows).reshape(-1).view(dtype).reshape(array.shape))
+
+    def _padded(self, values: np.ndarray) -> np.ndarray:
+        """Values (world_count, ...) with the last world's repeated for the unused ones of its group."""
+        spare = self.groups * self.lanes - self.world_count
+        return np.pad(values, [(0, spare)] + [(0, 0)] * (np.ndim(values) - 1), mode="edge")
+
+    def _fill(self, array: wp.array, values: np.ndarray) -> None:
+        """Set an array `(groups, n)` of Reals from `values` (world_count, n)."""
+        values = self._padded(np.asarray(values, np.float32))
+        values = values.reshape(self.groups, self.lanes, -1).transpose(0, 2, 1)
+        self._assign(array, values[:, :, None])
+
+    def _worlds(self, worlds) -> np.ndarray:
+        if worlds is None:
+            return np.arange(self.world_count)
+        worlds = np.atleast_1d(np.asarray(worlds))
+        if worlds.dtype == bool:
+            if worlds.shape != (self.world_count,):
+                raise ValueError(f"a mask of worlds must have shape ({self.world_count},)")
+            return np.flatnonzero(worlds)
+        if worlds.size and not np.issubdtype(worlds.dtype, np.integer):
+            raise ValueError("worlds must be whole numbers or a mask")
+        if worlds.size and not (worlds.min() >= 0 and worlds.max() < self.world_count):
+            raise IndexError(f"worlds must lie in 0 .. {self.world_count - 1}")
+        return worlds.astype(int)
+
+    def launch(self, kernel: str, count: int = 1) -> None:
+        """Run a kernel of `kernels.step`, the whole step or a part of it, `count` times."""
+        self._run(self._program, kernel, [count])
+
+    def _run(self, program, kernel: str, inputs: list) -> None:
+        """Launch over all groups, a slice of them per thread."""
+        function = getattr(program, kernel)
+        size = -(-self.groups // self.threads)
+
+        def run(first: int) -> None:
+            wp.launch(
+                function,
+                dim=min(size, self.groups - first),
+                inputs=[self._tree, self._world, first, *inputs],
+                device=self.device,
+            )
+
+        if program not in self._loaded:
+            program.load(self.device)  # before threads launch it
+            self._loaded.add(program)
+        others = [self._pool.submit(run, first) for first in range(size, self.groups, size)]
+        run(0)  # this thread works too
+        for other in others:
+            other.result()
+
+    @property
+    def memory_per_world(self) -> float:
+        """Bytes of state a world takes."""
+        arrays = (getattr(self._world, name) for name in self._program.World.vars)
+        return sum(a.capacity for a in arrays) / (self.groups * self.lanes)

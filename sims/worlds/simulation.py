@@ -1,0 +1,333 @@
+"""`Simulation`: many worlds of one model that step together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..model.model import Model
+from .batch import CARRIED, Batch
+from .tensors import Tensors, as_array
+
+SWEEPS = 10
+"""Sweeps of the contact solver a step; docs/physics.md shows the residual that this leaves."""
+
+MAX_SPEED = 100.0
+"""No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
+
+NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
+"""Bits of `Simulation.status`."""
+
+
+@dataclass
+class Contacts:
+    """Slots in which two shapes may touch, for all worlds."""
+
+    shapes: list[tuple[str, str]]
+    """(slots) names; impulses push the second along the normal"""
+    gap: np.ndarray
+    """(world_count, slots) [m], negative: overlap"""
+    point: np.ndarray
+    """(world_count, slots, 3) half way between the surfaces [m]"""
+    normal: np.ndarray
+    """(world_count, slots, 3) from the first shape to the second"""
+    impulse: np.ndarray
+    """(world_count, slots, 3) of the last step, along the normal and two tangents [N s]"""
+
+
+class Simulation(Batch):
+    """`world_count` worlds of a model.
+
+    A CPU steps `lanes` worlds in one pass of its vector unit and shares them among `threads`; on
+    CUDA every world has a thread. Neither choice changes a result beyond rounding, and `threads` not
+    at all.
+
+    Arrays are `(world_count, n)` NumPy arrays, float32.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        world_count: int = 1,
+        device: str = "cpu",
+        threads: int | None = None,
+        lanes: int | None = None,
+        sweeps: int = SWEEPS,
+        max_speed: float = MAX_SPEED,
+    ):
+        if not sweeps >= 1:
+            raise ValueError(f"sweeps must be at least 1, not {sweeps}")
+        if not max_speed > 0:
+            raise ValueError(f"max_speed must be positive, not {max_speed}")
+        super().__init__(model, world_count, device, threads, lanes)
+        self._tree.sweeps = sweeps
+        self._tree.max_speed = max_speed
+        self._targets_set = False
+        self.reset()
+
+    # ------------------------------------------------------------------------------------ control
+
+    def _values(self, name: str, values, n: int, count: int) -> np.ndarray:
+        """Checked `(n,)` or `(count, n)` float32, from NumPy or torch."""
+        values = as_array(values)
+        if values.shape not in ((n,), (count, n), (1, n)):
+            raise ValueError(f"{name} must have shape ({n},) or ({count}, {n}), not {values.shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{name} has values that are not finite")
+        return values
+
+    def _unit(self, q: np.ndarray, name: str) -> np.ndarray:
+        """joint_q with its quaternions normalised."""
+        q = q.copy()
+        for k in self.model.quaternions():
+            length = np.linalg.norm(q[..., k : k + 4], axis=-1, keepdims=True)
+            if (length < 0.1).any():
+                raise ValueError(f"{name}[{k}:{k + 4}] must be a unit quaternion (xyzw)")
+            q[..., k : k + 4] /= length
+        return q
+
+    def reset(self, worlds=None, joint_q=None, joint_qd=None) -> None:
+        """Put worlds into a state: by default all of them, the model's start pose, at rest.
+
+        joint_q: (nq,) or (len(worlds), nq) [m, rad, -]; joint_qd likewise (nv) [m/s, rad/s]. Clears
+        status and contact history. Where no targets were set yet, the pose becomes the target.
+        """
+        worlds = self._worlds(worlds)
+        model = self.model
+        if joint_q is None:
+            joint_q = model.start_q
+        q = self._unit(self._values("joint_q", joint_q, model.nq, len(worlds)), "joint_q")
+        qd = np.zeros(model.nv) if joint_qd is None else joint_qd
+        qd = self._values("joint_qd", qd, model.nv, len(worlds))
+        for name in CARRIED:
+            self._write(name, worlds, {"q": q, "qd": qd}.get(name, 0.0))
+        if not self._targets_set:
+            self._write("target", worlds, q)
+
+    def copy_worlds(self, sources) -> None:
+        """Give every world the state of another: world k becomes what world `sources[k]` (world_count,)
+        is now, its contact history and status included. Targets, forces and parameters stay."""
+        sources = self._worlds(sources)
+        if sources.shape != (self.world_count,):
+            raise ValueError(f"sources must have shape ({self.world_count},), not {sources.shape}")
+        moves = self._padded(sources).reshape(self.groups, self.lanes)
+        moves = wp.array(moves, dtype=int, device=self.device)
+        state = self._carried
+        if (sources[sources] != sources).any():  # a world that is copied from changes, too
+            state = self.snapshot()
+        self._run(self._exchange, "gather", [moves, self._blocks, state, self._carried])
+
+    def snapshot(self) -> wp.array:
+        """The state of all worlds, contact history and status included, for `restore`."""
+        return wp.clone(self._carried)
+
+    def restore(self, snapshot: wp.array) -> None:
+        """Put all worlds into the state of a `snapshot` of this simulation."""
+        wp.copy(self._carried, snapshot)
+
+    def set_targets(self, joint_target_q) -> None:
+        """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
+        target = self._values("joint_target_q", joint_target_q, self.model.nq, self.world_count)
+        target = self._unit(target, "joint_target_q")
+        self._write("target", np.arange(self.world_count), target)
+        self._targets_set = True
+
+    def set_joint_force(self, joint_f) -> None:
+        """Generalised forces on all dofs, until changed: (nv,) or (world_count, nv) [N, N m]."""
+        f = self._values("joint_f", joint_f, self.model.nv, self.world_count)
+        self._write("joint_f", np.arange(self.world_count), f)
+
+    def apply_force(self, body: str | int, force, worlds=None) -> None:
+        """A force (3,) or (len(worlds), 3) [N, world axes] at a body's centre of mass, until changed."""
+        worlds = self._worlds(worlds)
+        body = self.model.body(body) if isinstance(body, str) else int(body)
+        if not 0 <= body < self.model.nbody:
+            raise IndexError(f"body must lie in 0 .. {self.model.nbody - 1}, not {body}")
+        force = self._values("force", force, 3, len(worlds))
+        self._write("force", worlds, np.atleast_2d(force), column=body)
+        self._tree.forced = 1
+
+    def set_root_drive(
+        self,
+        kp_linear: float,
+        kd_linear: float,
+        kp_angular: float,
+        kd_angular: float,
+        joint: str | None = None,
+    ) -> None:
+        """Virtual drive that pulls a free joint (default: the first) towards its target, with the same
+        implicit law as the other drives; zeros set it free. [N/m, N s/m, N m/rad, N m s/rad]"""
+        model = self.model
+        free = [name for name in model.joint_names if model.joint_type(name) == "free"]
+        if not free:
+            raise ValueError("the model has no free joint")
+        if joint is not None and joint not in free:
+            raise ValueError(f"{joint!r} is not a free joint; there are: {', '.join(free)}")
+        first = model.dof_slice(joint or free[0]).start
+        for name, linear, angular in (
+            ("dof_kp", kp_linear, kp_angular),
+            ("dof_kd", kd_linear, kd_angular),
+        ):
+            gains = getattr(self._tree, name).numpy().copy()
+            gains[first : first + 3], gains[first + 3 : first + 6] = linear, angular
+            getattr(self._tree, name).assign(gains)
+
+    def step(self, count: int = 1) -> None:
+        """Advance all worlds by `count` steps of `model.timestep`."""
+        self._run(self._program, "step", [count, self._program.Course()])
+
+    @property
+    def forced(self) -> bool:
+        """Whether any external force was ever applied; kernels look for them from then on."""
+        return bool(self._tree.forced)
+
+    # ------------------------------------------------------------------------------- observations
+
+    @property
+    def joint_q(self) -> np.ndarray:
+        """(world_count, nq) [m, rad, -]"""
+        return self._read(self._world.q)
+
+    @property
+    def joint_qd(self) -> np.ndarray:
+        """(world_count, nv) [m/s, rad/s]"""
+        return self._read(self._world.qd)
+
+    @property
+    def torch(self) -> Tensors:
+        """The state as torch tensors, without a copy where the layout allows"""
+        return Tensors(self)
+
+    def bodies(self) -> tuple[np.ndarray, np.ndarray]:
+        """`body_q` and `body_qd`, in one go"""
+        n = self.model.nbody
+        pose = self._allocate(7 * n, self._program.Real)
+        velocity = self._allocate(6 * n, self._program.Real)
+        self._run(self._observer, "bodies", [pose, velocity])
+        shape = (self.world_count, n, -1)
+        return self._read(pose).reshape(shape), self._read(velocity).reshape(shape)
+
+    @property
+    def body_q(self) -> np.ndarray:
+        """(world_count, nbody, 7): position [m] and quaternion xyzw of each body's frame"""
+        return self.bodies()[0]
+
+    @property
+    def body_qd(self) -> np.ndarray:
+        """(world_count, nbody, 6): velocity of each body's centre of mass [m/s], angular velocity [rad/s],
+        along the world's axes"""
+        return self.bodies()[1]
+
+    @property
+    def status(self) -> np.ndarray:
+        """(world_count,) bit mask since the last reset: `NONFINITE`, `FALL` (a part of the player other
+        than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand),
+        `OVERSPEED` (a joint was held back to `max_speed`)"""
+        flags = {"broken": NONFINITE, "fallen": FALL, "fumbled": BAD_CONTACT, "hurried": OVERSPEED}
+        return sum(
+            bit * (self._read(getattr(self._world, name))[:, 0] > 0).astype(np.int32)
+            for name, bit in flags.items()
+        )
+
+    def contacts(self) -> Contacts:
+        """Every slot of every world: its gap now, and the impulse of the last step."""
+        self._run(self._observer, "gaps", [])
+        model, world = self.model, self._world
+        count = self._tree.slot_count
+        impulse = self._read(world.impulse)[:, :count]
+        knock = self._read(world.knock)
+        for link, slot in zip(
+            model.tables.get("flight_link", ()), model.tables.get("flight_slot", ()), strict=True
+        ):
+            impulse[:, slot, 0] += knock[:, link]
+        pairs = model.tables.get("slot_pair", np.zeros(0, int))
+        shapes = [model.pairs[pair]["shapes"] for pair in pairs]
+        return Contacts(
+            shapes=[(model.shapes[a].name, model.shapes[b].name) for a, b in shapes],
+            gap=self._read(world.gap)[:, :count],
+            point=self._read(world.point)[:, :count],
+            normal=self._read(world.normal)[:, :count],
+            impulse=impulse,
+        )
+
+    def copy_contact_history(self, other: Simulation) -> None:
+        """Take over another simulation's impulses of the last step, from which a solve starts."""
+        same = (other.model is self.model, other.lanes == self.lanes, other.world_count == self.world_count)
+        if not all(same):
+            raise ValueError("the other simulation must have the same model, lanes and world_count")
+        wp.copy(self._world.impulse, other._world.impulse)
+
+    def contact_residual(self) -> np.ndarray:
+        """(world_count,) largest velocity [m/s] by which a contact of the last step misses its law"""
+        out = self._allocate(1, self._program.Real)
+        self._run(self._program, "run_residual", [out])
+        return self._read(out)[:, 0]
+
+    def mass_matrix(self) -> np.ndarray:
+        """(world_count, nv, nv) joint-space inertia, armature included [kg, kg m, kg m^2]"""
+        M = self._allocate(self.model.nv**2, self._program.Real)
+        self._run(self._observer, "mass_matrix", [M])
+        return self._read(M).reshape(self.world_count, self.model.nv, self.model.nv)
+
+    def bias_force(self) -> np.ndarray:
+        """(world_count, nv) Coriolis, centrifugal and gravity force, as they stand on the left of
+        M qdd + bias = f [N, N m]; applied external forces count in"""
+        C = self._allocate(self.model.nv, self._program.Real)
+        self._run(self._observer, "bias_force", [C])
+        return self._read(C)
+
+    # ------------------------------------------------------------------------- parameters by world
+
+    def set_contact(
+        self,
+        a: str,
+        b: str,
+        restitution: float | np.ndarray | None = None,
+        friction: float | np.ndarray | None = None,
+        worlds=None,
+    ) -> None:
+        """Set the restitution and friction [-] of every contact between two shapes or bodies, in some
+        worlds; a number, or one per world. Raises ValueError where a and b cannot touch."""
+        worlds = self._worlds(worlds)
+        names = self._shape_groups()
+        for name in (a, b):
+            if name not in names:
+                raise ValueError(f"no shape or body named {name!r}")
+        found = [
+            k
+            for k, pair in enumerate(self.model.pairs)
+            for x, y in (pair["shapes"], pair["shapes"][::-1])
+            if x in names[a] and y in names[b]
+        ]
+        if not found:
+            raise ValueError(f"{a!r} and {b!r} never touch in this model")
+        for name, value in (("restitution", restitution), ("friction", friction)):
+            if value is None:
+                continue
+            value = np.asarray(value, np.float32)
+            if not np.isfinite(value).all() or (value < 0).any():
+                raise ValueError(f"{name} must not be negative")
+            for k in found:
+                self._write(name, worlds, value.reshape(-1, 1), column=k)
+
+    def _shape_groups(self) -> dict[str, set[int]]:
+        groups: dict[str, set[int]] = {}
+        for k, shape in enumerate(self.model.shapes):
+            groups.setdefault(shape.name, set()).add(k)
+            body = "world" if shape.body < 0 else self.model.body_names[shape.body]
+            groups.setdefault(body, set()).add(k)
+        return groups
+
+    def set_mass(self, body: str, mass: float | np.ndarray, worlds=None) -> None:
+        """Set a body's mass [kg] in some worlds, its inertia in proportion; a number, or one per world."""
+        worlds = self._worlds(worlds)
+        b = self.model.body(body)
+        link = int(self.model.tables["body_link"][b])
+        if link == 0 or (self.model.tables["body_link"] == link).sum() > 1:
+            raise ValueError(f"body {body!r} is fixed to another: its mass cannot be set alone")
+        mass = np.asarray(mass, np.float32)
+        if not np.isfinite(mass).all() or (mass <= 0).any():
+            raise ValueError("mass must be positive")
+        self._write("mass_scale", worlds, (mass / self.model.body_mass[b]).reshape(-1, 1), column=link)

@@ -1,0 +1,334 @@
+"""Trials of policies: poses over the ground against complex numbers, what became of each trial against an
+account kept by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from warpdribble.learning.evaluate.trials import (
+    States,
+    composed,
+    planar,
+    reference_states,
+    relative,
+    run_trials,
+    wrapped,
+)
+from warpdribble.learning.graph import STEPS, cyclic_graph
+from warpdribble.learning.tasks.disturbance import Disturbance
+from warpdribble.learning.tasks.locomotion import FALLEN, FELT, JUDGED
+from warpdribble.sims import Simulation
+from warpdribble.sims.model import pose
+from warpdribble.sims.worlds.simulation import FALL
+
+# ------------------------------------------------------------------------------- poses over the ground
+
+number = st.floats(-100, 100)
+triples = st.integers(1, 4).flatmap(
+    lambda n: st.tuples(*[st.lists(st.tuples(number, number, number), min_size=n, max_size=n)] * 3)
+)
+EXACT = 1e-9  # float64 of some 100 m and rad
+
+
+def complex_of(a):
+    """Place and unit direction."""
+    return a[:, 0] + 1j * a[:, 1], np.exp(1j * a[:, 2])
+
+
+def assert_same(a, b):
+    """The same places, and angles that differ by whole turns."""
+    np.testing.assert_allclose(a[:, :2], b[:, :2], atol=EXACT)
+    np.testing.assert_allclose(np.exp(1j * a[:, 2]), np.exp(1j * b[:, 2]), atol=EXACT)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(triples)
+def test_going_on_and_seen_from(three):
+    """Composition is the product of complex numbers; `relative` undoes it; it is associative."""
+    a, b, c = map(np.array, three)
+    place, turn = complex_of(a)
+    there, facing = complex_of(b)
+    at, ahead = complex_of(composed(a, b))
+    np.testing.assert_allclose(at, place + turn * there, atol=EXACT)
+    np.testing.assert_allclose(ahead, turn * facing, atol=EXACT)
+    seen, way = complex_of(relative(a, b))
+    np.testing.assert_allclose(seen, (there - place) / turn, atol=EXACT)
+    np.testing.assert_allclose(way, facing / turn, atol=EXACT)
+    assert_same(composed(a, relative(a, b)), b)
+    assert_same(relative(a, composed(a, b)), b)
+    assert_same(composed(composed(a, b), c), composed(a, composed(b, c)))
+    assert_same(relative(composed(c, a), composed(c, b)), relative(a, b))  # who looks from where it is
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.lists(st.floats(-1000, 1000), min_size=1, max_size=5).map(np.array))
+def test_wrapped(angle):
+    inside = wrapped(angle)
+    assert (inside >= -np.pi).all() and (inside <= np.pi).all()
+    turns = (inside - angle) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    near = np.abs(angle) < np.pi - 1e-9
+    np.testing.assert_allclose(inside[near], angle[near], atol=1e-12)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    st.lists(
+        st.tuples(number, number, st.floats(-3.1, 3.1), st.floats(-1.4, 1.4), st.floats(-3, 3)), min_size=1
+    )
+)
+def test_planar(cases):
+    """The heading is the yaw of yaw, pitch and roll, for a pitch short of a right angle."""
+    x, y, yaw, pitch, roll = np.array(cases).T
+    q = np.zeros((len(x), 9))
+    q[:, 0], q[:, 1], q[:, 2] = x, y, 1.0
+    q[:, 3:7] = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=1)).as_quat()
+    np.testing.assert_allclose(planar(q), np.stack([x, y, yaw], axis=1), atol=EXACT)
+
+
+# --------------------------------------------------------------------------------------------- states
+
+
+def test_states_are_drawn_with_noise_on_velocities_only(graph):
+    states = reference_states(graph)
+    assert len(states) == graph.count
+    drawn = states.draw(3000, np.random.default_rng(1), 0.5)
+    np.testing.assert_array_equal(drawn.joint_q, graph.start_q[drawn.k])
+    assert set(drawn.k) == set(range(graph.count))
+    noise = drawn.joint_qd - graph.start_qd[drawn.k]
+    assert noise.std() == pytest.approx(0.5, rel=0.02) and (noise.std(axis=0) > 0.4).all()
+    still = states.draw(5, np.random.default_rng(1))
+    np.testing.assert_array_equal(still.joint_qd, graph.start_qd[still.k])
+
+
+# --------------------------------------------------------------------------------------------- trials
+
+
+def open_loop(task):
+    return task.open_loop()
+
+
+def facing_ends(model, joint_q):
+    """(n, ends, 3) in the facing frame, float64."""
+    body_q = pose.forward(model, joint_q)
+    out = []
+    for name in FELT:
+        body = model.body(name)
+        middle = next(s.pos for s in model.shapes if s.body == body)
+        place = body_q[:, body, :3] + Rotation.from_quat(body_q[:, body, 3:]).apply(middle)
+        out.append(place - joint_q[:, :3] * [1, 1, 0])
+    back = Rotation.from_euler("z", -planar(joint_q)[:, 2:])
+    return np.stack([back.apply(place) for place in out], axis=1)
+
+
+def by_hand(task, states, seed, cycles, speed_noise):
+    """Open loop with `set_targets` and `step` alone: survived, lived, the mean angle and end errors of who
+    stands, and drift and turn per cycle."""
+    model, graph, n = task.model, task.graph, task.sim.world_count
+    random = np.random.default_rng(seed)
+    start = states.draw(n, random, speed_noise)
+    sim, k = Simulation(model, n), start.k
+    sim.reset(joint_q=start.joint_q, joint_qd=start.joint_qd)
+    stands, lived = np.ones(n, bool), np.zeros(n)
+    angles, ends, drifts, turns = [], [], [], []
+    begun, way = start.joint_q.astype(float), np.zeros(n, complex)
+    bearing, fragments = np.zeros(n), cycles * graph.count
+    ends_of = facing_ends(model, graph.goal_q)
+    for row in range(fragments):
+        for j in range(STEPS):
+            sim.set_targets(graph.targets[k * STEPS + j])
+            sim.step()
+        q = sim.joint_q.astype(float)
+        high = q[:, 2] > graph.goal_q[k, 2] - FALLEN
+        stands &= high & ((sim.status & FALL) == 0)
+        lived += stands
+        off = []
+        for name in JUDGED:
+            place = model.q_slice(name)
+            if model.joint_type(name) == "hinge":
+                off.append(np.abs(q[:, place] - graph.goal_q[k][:, place])[:, 0])
+            else:
+                now, goal = (Rotation.from_quat(x[:, place]) for x in (q, graph.goal_q[k]))
+                off.append((now * goal.inv()).magnitude())
+        angles.extend(np.mean(off, axis=0)[stands])
+        miss = np.linalg.norm(facing_ends(model, q) - ends_of[k], axis=-1).mean(axis=1)
+        ends.extend(miss[stands])
+        place, turn = complex_of(planar(graph.start_q[k]))
+        after, turned = complex_of(planar(graph.goal_q[k]))
+        way += np.exp(1j * bearing) * (after - place) / turn
+        bearing += np.angle(turned / turn)
+        if (row + 1) % graph.count == 0:
+            place, turn = complex_of(planar(begun))
+            after, turned = complex_of(planar(q))
+            drifts.extend(np.abs((after - place) / turn - way)[stands])
+            turns.extend(np.abs(np.angle(turned / turn * np.exp(-1j * bearing)))[stands])
+            begun, way, bearing = q, np.zeros(n, complex), np.zeros(n)
+        k = (k + 1) % graph.count
+    return stands, lived / fragments, [np.mean(x) for x in (angles, ends, drifts, turns)]
+
+
+def check(trials, expected):
+    """Rounding of the targets, 1e-7, through two seconds of contacts."""
+    survived, lived, errors = expected
+    np.testing.assert_array_equal(trials.survived, survived)
+    np.testing.assert_allclose(trials.lived, lived, atol=1e-12)
+    found = [trials.angle_error, trials.end_error, trials.drift, trials.turn]
+    np.testing.assert_allclose(found, errors, rtol=0.02, atol=1e-4)
+
+
+def test_a_player_that_stands(task, standing):
+    """For ten cycles of 0.25 s in the held pose: all survive, and stay where they are to a few mm and
+    hundredths of a rad."""
+    worlds = task(19, graph=standing)
+    trials = run_trials(worlds, open_loop(worlds), reference_states(standing), 10, seed=3)
+    assert trials.survived.all() and (trials.lived == 1.0).all()
+    assert 0.0 < trials.angle_error < 0.02 and 0.0 < trials.end_error < 0.01
+    assert trials.drift < 0.005 and trials.turn < 0.01 and 0.0 < trials.cost < 1.0
+    check(trials, by_hand(worlds, reference_states(standing), 3, 10, 0.0))
+
+
+def test_some_fall(task, graph):
+    """Of the dribble begun with all joints at up to some rad/s: who falls, when, and how the others do."""
+    worlds = task(19)
+    trials = run_trials(worlds, open_loop(worlds), reference_states(graph), 2, seed=6, speed_noise=0.5)
+    assert 2 < trials.survived.sum() < 17
+    assert ((trials.lived == 1.0) == trials.survived).all() and len(np.unique(trials.lived)) > 3
+    check(trials, by_hand(worlds, reference_states(graph), 6, 2, 0.5))
+
+
+def moved(joint_q, poses):
+    """joint_q (n, nq) with their roots moved and turned over the ground to planar poses (n, 3)."""
+    joint_q = np.array(joint_q, float)
+    turn = Rotation.from_euler("z", (poses - planar(joint_q))[:, 2:])
+    joint_q[:, 3:7] = (turn * Rotation.from_quat(joint_q[:, 3:7])).as_quat()
+    joint_q[:, :2] = poses[:, :2]
+    return joint_q
+
+
+def carry(worlds, slip=0.0, turn=0.0):
+    """Make a task put each player where its fragment leads, from where it is; and `slip` further ahead [m],
+    turned by `turn` [rad]."""
+    graph = worlds.graph
+
+    def advance(k, action):
+        place, facing = complex_of(planar(worlds.sim.joint_q.astype(float)))
+        start, before = complex_of(planar(graph.start_q[k]))
+        goal, after = complex_of(planar(graph.goal_q[k]))
+        place = place + facing * ((goal - start) / before + slip)
+        facing = np.angle(facing * after / before * np.exp(1j * turn))
+        poses = np.stack([place.real, place.imag, facing], axis=1)
+        worlds.sim.reset(joint_q=moved(graph.goal_q[k], poses))
+        return worlds.character.sense(k)
+
+    worlds.advance = advance
+    return worlds
+
+
+@pytest.mark.parametrize(("slip", "turn"), [(0.0, 0.0), (0.01, 0.0), (0.0, 0.02), (0.01, -0.02)])
+def test_the_way_of_the_reference_is_no_drift(task, player, curve, slip, turn):
+    """A player who is carried along a curve, from anywhere in the world: nothing is missed but what it slips
+    and turns besides, which float32 adds up to 1e-5."""
+    graph = cyclic_graph(player, curve)
+    worlds, random = carry(task(19, graph=graph), slip, turn), np.random.default_rng(1)
+    poses = random.uniform(-3, 3, (graph.count, 3))
+    states = States(np.arange(graph.count), moved(graph.start_q, poses), graph.start_qd)
+    trials = run_trials(worlds, open_loop(worlds), states, 2, seed=1)
+    assert trials.survived.all()
+    assert trials.angle_error < 2e-4 and trials.end_error < 1e-5
+    assert trials.turn == pytest.approx(graph.count * abs(turn), abs=1e-4)
+    k, off = np.random.default_rng(1).integers(graph.count, size=19), []
+    for start in k:
+        right = left = 0j
+        facing = bearing = 1.0 + 0j
+        for j in (start + np.arange(graph.count)) % graph.count:
+            (a, b), (c, d) = (complex_of(planar(x[j : j + 1])) for x in (graph.start_q, graph.goal_q))
+            right, facing = right + facing * (c - a) / b, facing * d / b
+            left, bearing = left + bearing * ((c - a) / b + slip), bearing * d / b * np.exp(1j * turn)
+        off.append(abs(left - right))
+    assert trials.drift == pytest.approx(np.mean(off), abs=1e-4)
+
+
+def test_nobody_stands(task, graph):
+    """From a height at which all fall at once: no time lived, no errors."""
+    worlds = task(4)
+    joint_q = graph.start_q.copy()
+    joint_q[:, 2] -= 0.5
+    trials = run_trials(worlds, open_loop(worlds), States(np.arange(graph.count), joint_q, graph.start_qd), 1)
+    assert not trials.survived.any() and not trials.lived.any()
+    for value in (trials.cost, trials.angle_error, trials.end_error, trials.drift, trials.turn):
+        assert np.isnan(value)
+
+
+def test_a_world_that_breaks_does_so_alone(task, graph):
+    """It counts as fallen; the others end as they would have."""
+    worlds, calls = task(4), []
+    whole = run_trials(worlds, open_loop(worlds), reference_states(graph), 2, seed=1)
+    advance = worlds.advance
+
+    def breaks(k, action):
+        calls.append(None)
+        if len(calls) == 5:
+            worlds.sim._write(
+                "q", np.array([2]), np.array([np.nan]), column=worlds.model.q_slice("root").start + 3
+            )
+        return advance(k, action)
+
+    worlds.advance = breaks
+    trials = run_trials(worlds, open_loop(worlds), reference_states(graph), 2, seed=1)
+    np.testing.assert_array_equal(trials.survived, [True, True, False, True])
+    np.testing.assert_array_equal(trials.lived[[0, 1, 3]], whole.lived[[0, 1, 3]])
+    assert trials.lived[2] == 4 / (2 * graph.count) and np.isfinite(trials.drift)
+
+
+def test_who_fell_once_does_not_stand_again(task, graph):
+    worlds, calls = task(4), []
+    cost = worlds.cost
+
+    def falls(felt, k):
+        calls.append(None)
+        E = cost(felt, k)
+        E[1] = np.inf if len(calls) == 7 else E[1]
+        return E
+
+    worlds.cost = falls
+    trials = run_trials(worlds, open_loop(worlds), reference_states(graph), 2)
+    np.testing.assert_array_equal(trials.survived, [True, False, True, True])
+    np.testing.assert_allclose(trials.lived, [1.0, 6 / (2 * graph.count), 1.0, 1.0])
+
+
+def test_progress_and_less_than_a_cycle(task, graph):
+    worlds, seen = task(3), []
+    trials = run_trials(worlds, open_loop(worlds), reference_states(graph), 0.5, progress=seen.append)
+    assert seen == list(range(1, graph.count // 2 + 1))
+    assert np.isnan(trials.drift) and trials.survived.all()
+
+
+def test_trials_repeat_and_seeds_differ(task, graph):
+    """Also after other trials in the same worlds, disturbed ones."""
+    worlds = task(16)
+    what = Disturbance(push=200.0, arms=0.2, hands=18.0)
+
+    def tried(seed, disturbance=what):
+        return run_trials(
+            worlds, open_loop(worlds), reference_states(graph), 3, seed, 0.2, disturbance=disturbance
+        )
+
+    calm = tried(1, Disturbance())
+    first, other, again = tried(1), tried(2), tried(1)
+    assert vars(first)["cost"] == again.cost != other.cost
+    np.testing.assert_array_equal(first.lived, again.lived)
+    assert (first.drift, first.turn) == (again.drift, again.turn)
+    assert first.cost > 1.5 * calm.cost
+    after = tried(1, Disturbance())
+    assert (after.cost, after.drift, after.end_error) == (calm.cost, calm.drift, calm.end_error)
+
+
+def test_a_policy_s_offsets_are_carried_out(task, graph):
+    """One that bends a knee by 0.3 rad shows it in the mean angle, and takes the state it is in."""
+    worlds = task(8)
+    bent = open_loop(worlds)
+    bent.a_hat[:, -1] = 0.3
+    plain = run_trials(worlds, open_loop(worlds), reference_states(graph), 1)
+    assert run_trials(worlds, bent, reference_states(graph), 1).angle_error > plain.angle_error + 0.005

@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+
+from warpdribble.clips.read import read_clip
+from warpdribble.sims import Model
+from warpdribble.sims.authored.catalogue import authored_clip
+from warpdribble.sims.ball.ball import find_checkpoints, flights_of, inferred_ball, recorded_ball
+from warpdribble.sims.ball.contact_score import score_contacts
+from warpdribble.sims.ball.flight import flight_height, speed_to_meet, thrown, time_to_ground
+from warpdribble.sims.reference.reference import Cycle
+from warpdribble.sims.retarget.retarget import retargeted
+
+R = 0.1193
+
+
+@pytest.fixture(scope="module")
+def player():
+    return Model.load("player")
+
+
+def retargeted_clip(player, mocap, name):
+    motion, _ = read_clip(mocap / name)
+    return motion, retargeted(player, motion)
+
+
+@pytest.mark.parametrize(
+    ("height", "after", "duration"), [(0.8, 0.9, 0.45), (0.6, 0.6, 0.3), (1.0, 0.8, 0.8)]
+)
+def test_a_flight_ends_where_it_should(height, after, duration):
+    speed = speed_to_meet(height, after, duration, R)
+    assert flight_height(np.array(duration), height, speed, R) == pytest.approx(after, abs=1e-6)
+    lands = time_to_ground(height, speed, R)
+    before, behind = (flight_height(np.array(lands + d), height, speed, R) for d in (-1e-4, 1e-4))
+    assert (behind - R) / (before - R) == pytest.approx(0.8, abs=0.01)
+
+
+def test_a_flight_that_cannot_be_is_none():
+    assert speed_to_meet(0.8, 3.0, 0.2, R) is None
+
+
+def test_a_thrown_ball_bounces_lower_and_lower():
+    path = thrown(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.arange(400) * 0.01, R)
+    tops = path[1:-1, 2][(path[1:-1, 2] > path[:-2, 2]) & (path[1:-1, 2] >= path[2:, 2])]
+    assert tops[0] - R == pytest.approx(0.64 * (1.0 - R), abs=0.005)
+    assert np.all(np.diff(tops[:3]) < 0.0) and path[:, 2].min() >= R
+    assert path[-1, 0] == pytest.approx(3.99)
+
+
+def test_checkpoints_are_the_highest_rows_of_contacts():
+    height = np.array([3.0, 2, 1, 1, 2, 4, 2, 1, 1, 2, 3])
+    touch = np.zeros((11, 2), bool)
+    touch[[0, 1, 4, 5, 6, 9, 10], 1] = True
+    assert find_checkpoints(height, touch) == (5,)
+    assert [(f.release, f.catch) for f in flights_of(touch)] == [(2, 4), (7, 9)]
+
+
+def test_the_authored_dribble_s_ball_is_found_from_its_hand(player):
+    clip = authored_clip(player, "dribble_right")
+    reference = Cycle(clip.reference).repeat(player, 4)
+    ball = inferred_ball(player, reference)
+    assert not ball.touch[:, 0].any()
+    true = np.concatenate([np.tile(clip.ball.touch[:-1].any(axis=1), 4), [True]])
+    score = score_contacts(ball.touch.any(axis=1), true, player.timestep)
+    assert score.recall > 0.95 and score.missed == 0
+    assert [f.release for f in ball.flights] == pytest.approx([1 + 70 * k for k in range(5)], abs=8)
+    assert ball.heights[1:-1] == pytest.approx([clip.ball.heights[0]] * len(ball.heights[1:-1]), abs=0.03)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ballplay_m/044_006pickle_lleg_2.pt",
+        "ballplay_m/041_018pickle_pick2back_7.pt",
+        "ballplay_m/013_018pickle_run_3.pt",
+        "ballplay_m/001_007pickle_pick_002.pt",
+    ],
+)
+def test_contacts_agree_with_the_recorded_ball(player, mocap, name):
+    motion, result = retargeted_clip(player, mocap, name)
+    ball, true = inferred_ball(player, result.reference), recorded_ball(player, result, motion)
+    score = score_contacts(ball.touch.any(axis=1), true.touch.any(axis=1), player.timestep)
+    assert score.precision > 0.9 and score.recall > 0.9
+    assert score.missed == 0 and np.abs(score.timing).mean() < 0.15
+    assert np.linalg.norm(np.diff(ball.path, axis=0), axis=1).max() < 0.25
+    assert ball.path[:, 2].min() > 0.1
+
+
+def test_checkpoints_and_heights_agree_with_the_recorded_ball(player, mocap):
+    motion, result = retargeted_clip(player, mocap, "ballplay_m/044_006pickle_lleg_2.pt")
+    ball, true = inferred_ball(player, result.reference), recorded_ball(player, result, motion)
+    assert len(ball.checkpoints) == len(true.checkpoints) == 3
+    assert np.abs(np.subtract(ball.checkpoints, true.checkpoints)).max() < 10
+    assert np.abs(np.subtract(ball.heights, true.heights)).max() < 0.03
+
+
+def test_hands_that_push_are_told_from_arms_that_swing(player, mocap):
+    for name in ("cmu/02_01.bvh", "cmu/09_01.bvh", "cmu/09_11.bvh"):
+        assert inferred_ball(player, retargeted_clip(player, mocap, name)[1].reference) is None, name
+    ball = inferred_ball(player, retargeted_clip(player, mocap, "cmu/06_10.bvh")[1].reference)
+    pushes = [f for f in ball.flights if f.hand == 1]
+    assert len(pushes) >= 10  # 1.21 Hz for 7.7 s, and what comes before and after
+
+
+def test_scores_add_up():
+    a = np.zeros(100, bool)
+    a[20:50] = True
+    b = np.roll(a, 3)
+    one = score_contacts(b, a, 0.01)
+    assert one.precision == one.recall == 1.0
+    assert one.timing == pytest.approx((0.03, 0.03)) and one.missed == 0
+    far = score_contacts(np.roll(a, 40), a, 0.01)
+    assert far.precision < 0.2 and (one + far).inferred == 60
+    nothing = score_contacts(np.zeros(100, bool), a, 0.01)
+    assert nothing.precision == 1.0 and nothing.recall == 0.0 and nothing.missed == 2

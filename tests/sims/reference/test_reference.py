@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from warpdribble.sims import Model
+from warpdribble.sims.reference.reference import Reference, close_cycle, difference, integrate, resample_q
+
+
+@pytest.fixture(scope="module")
+def player():
+    return Model.load("player")
+
+
+def random_motion(model, count=5, size=0.5, seed=0):
+    return size * np.random.default_rng(seed).normal(size=(count, model.nv))
+
+
+def walk(model, frames=51, travel=(1.2, 0.3), turn=0.6, gap=0.05):
+    """Joint coordinates that wander a little and walk a long way."""
+    share = np.linspace(0.0, 1.0, frames)[:, None]
+    sway = np.sin(2.0 * np.pi * share) * random_motion(model, 1, 0.3)
+    joint_q = integrate(model, np.tile(model.start_q, (frames, 1)), sway)
+    joint_q = integrate(model, joint_q, share * random_motion(model, 1, gap, seed=1))
+    joint_q[:, :2] = share * travel
+    yaw = Rotation.from_rotvec(share * [0.0, 0.0, turn])
+    joint_q[:, 3:7] = (yaw * Rotation.from_quat(joint_q[:, 3:7])).as_quat()
+    return Reference(joint_q, model.timestep)
+
+
+def test_integrate_undoes_difference(player):
+    start = integrate(player, np.tile(player.start_q, (5, 1)), random_motion(player))
+    motion = random_motion(player, seed=1)
+    end = integrate(player, start, motion)
+    assert np.allclose(difference(player, start, end), motion, atol=1e-9)
+
+
+def test_velocity_times_the_step_leads_to_the_next_row(player):
+    reference = walk(player)
+    velocity = reference.velocity(player)
+    assert velocity.shape == (reference.frame_count, player.nv)
+    after = integrate(player, reference.joint_q[:-1], player.timestep * velocity[:-1])
+    assert np.abs(difference(player, after, reference.joint_q[1:])).max() < 1e-9
+
+
+def test_a_closed_cycle_ends_where_the_next_begins(player):
+    cycle = close_cycle(player, walk(player))
+    assert np.hypot(*cycle.travel) == pytest.approx(np.hypot(1.2, 0.3), abs=0.01)
+    assert cycle.turn == pytest.approx(0.6, abs=0.1)
+    first, last = cycle.reference.joint_q[[0, -1]]
+    apart = difference(player, first[None], last[None])[0]
+    assert np.abs(apart[6:]).max() < 1e-9
+    assert apart[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_drift_of_somebody_standing_is_closed(player):
+    cycle = close_cycle(player, walk(player, travel=(0.07, 0.02), turn=-0.1))
+    assert cycle.turn == 0.0 and cycle.travel == (0.0, 0.0)
+    first, last = cycle.reference.joint_q[[0, -1]]
+    assert np.abs(difference(player, first[None], last[None])).max() < 1e-9
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_repeated_cycles_join_without_a_jump(player, count):
+    cycle = close_cycle(player, walk(player))
+    frames = cycle.reference.frame_count
+    joint_q = cycle.repeat(player, count).joint_q
+    assert len(joint_q) == count * (frames - 1) + 1
+    inside = np.abs(difference(player, cycle.reference.joint_q[:-1], cycle.reference.joint_q[1:]))
+    steps = np.abs(difference(player, joint_q[:-1], joint_q[1:]))
+    assert steps[:, 6:].max() == pytest.approx(inside[:, 6:].max())
+    length = np.linalg.norm(np.diff(joint_q[:, :2], axis=0), axis=1)
+    assert (
+        length.max() < 1.001 * np.linalg.norm(np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1).max()
+    )
+
+
+def test_a_cycle_cannot_be_repeated_less_than_once(player):
+    with pytest.raises(ValueError, match="at least once"):
+        close_cycle(player, walk(player)).repeat(player, 0)
+
+
+def test_resampled_rows_have_unit_quaternions(player):
+    rows = resample_q(player, walk(player).joint_q, np.array([0.0, 0.5, 17.3, 50.0]))
+    for k in player.quaternions():
+        assert np.allclose(np.linalg.norm(rows[:, k : k + 4], axis=1), 1.0)
+    assert np.allclose(rows[0], walk(player).joint_q[0], atol=1e-9)

@@ -1,0 +1,225 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from warpdribble.clips.bvh import read_bvh
+from warpdribble.clips.read import read_clip
+from warpdribble.sims import Model
+from warpdribble.sims.model import gaps, pose
+from warpdribble.sims.retarget.accuracy import accuracy
+from warpdribble.sims.retarget.mapping import MappingError, read_mapping
+from warpdribble.sims.retarget.retarget import retarget, retargeted
+
+BONES = {
+    "l_upper_arm": ("l_lower_arm", "LeftArm", "LeftForeArm"),
+    "r_upper_arm": ("r_lower_arm", "RightArm", "RightForeArm"),
+    "l_lower_arm": ("l_hand", "LeftForeArm", "LeftHand"),
+    "r_lower_arm": ("r_hand", "RightForeArm", "RightHand"),
+    "l_upper_leg": ("l_lower_leg", "LeftUpLeg", "LeftLeg"),
+    "r_upper_leg": ("r_lower_leg", "RightUpLeg", "RightLeg"),
+    "l_lower_leg": ("l_foot", "LeftLeg", "LeftFoot"),
+    "r_lower_leg": ("r_foot", "RightLeg", "RightFoot"),
+}
+PLACES = {"l_foot": "LeftFoot", "r_foot": "RightFoot", "l_lower_leg": "LeftLeg"}
+PLACES |= {"torso": "Spine1", "head": "Neck1", "l_hand": "LeftFingerBase"}
+PLACES |= {"r_lower_leg": "RightLeg", "r_hand": "RightFingerBase"}
+
+
+def soles(model):
+    return [model.body(f"{side}_{part}") for side in "lr" for part in ("foot", "toes")]
+
+
+@pytest.fixture(scope="module")
+def player():
+    return Model.load("player")
+
+
+@pytest.fixture(scope="module")
+def dribble(mocap):
+    motion, _ = read_bvh(mocap / "cmu" / "06_12.bvh")
+    return motion.slice(597, 684)
+
+
+def test_limbs_point_where_the_recording_s_do(player, dribble):
+    body_q = pose.forward(player, retarget(player, dribble, ik=False).joint_q)
+    positions, _ = dribble.resample(1.0 / player.timestep).forward()
+    for body, (next_body, joint, next_joint) in BONES.items():
+        ours = body_q[:, player.body(next_body), :3] - body_q[:, player.body(body), :3]
+        theirs = positions[:, dribble.index(next_joint)] - positions[:, dribble.index(joint)]
+        cosine = np.sum(ours * theirs, axis=1)
+        cosine /= np.linalg.norm(ours, axis=1) * np.linalg.norm(theirs, axis=1)
+        assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 4.0, body
+
+
+def test_joints_are_near_the_recording_s_scaled_by_leg_length(player, dribble):
+    body_q = pose.forward(player, retarget(player, dribble, ik=False).joint_q)
+    motion = dribble.resample(1.0 / player.timestep)
+    positions, _ = motion.forward()
+    scale = 0.8917 / 0.866
+    hips = 0.5 * (positions[:, motion.index("LeftUpLeg")] + positions[:, motion.index("RightUpLeg")])
+    root = body_q[:, player.body("pelvis"), :3]
+    for body, joint in PLACES.items():
+        ours = body_q[:, player.body(body), :3] - root
+        theirs = scale * (positions[:, motion.index(joint)] - hips)
+        error = np.linalg.norm(ours - theirs, axis=1).mean()
+        assert error < (0.03 if "leg" in body or "foot" in body else 0.09), body
+
+
+@pytest.mark.parametrize(
+    ("clip", "frames"),
+    [("06_12", (597, 684)), ("06_02", (413, 533)), ("02_01", (10, 300)), ("08_01", (10, 200))],
+)
+def test_feet_stand_on_the_ground(player, mocap, clip, frames):
+    motion, _ = read_bvh(mocap / "cmu" / f"{clip}.bvh")
+    reference = retarget(player, motion.slice(*frames))
+    body_q = pose.forward(player, reference.joint_q)
+    lowest = gaps.lowest_point(player, body_q, soles(player))
+    assert np.median(lowest) == pytest.approx(0.0, abs=0.03)
+    assert lowest.min() > -0.05
+
+
+def test_one_row_per_time_step(player, dribble):
+    reference = retarget(player, dribble)
+    assert reference.joint_q.shape == (73, player.nq)
+    assert reference.timestep == player.timestep
+    for k in player.quaternions():
+        assert np.allclose(np.linalg.norm(reference.joint_q[:, k : k + 4], axis=1), 1.0)
+
+
+def test_fingers_toes_and_ball_keep_the_start_pose(player, dribble):
+    joint_q = retarget(player, dribble).joint_q
+    for joint in ("r_index_mcp", "l_thumb_pip", "l_toes", "ball"):
+        assert np.allclose(joint_q[:, player.q_slice(joint)], player.start_q[player.q_slice(joint)])
+
+
+def test_knees_and_elbows_bend_the_way_they_can(player, mocap):
+    motion, _ = read_bvh(mocap / "cmu" / "06_12.bvh")
+    joint_q = retarget(player, motion.slice(400, 1040)).joint_q
+    for joint in ("l_knee", "r_knee", "l_elbow", "r_elbow"):
+        angles = joint_q[:, player.q_slice(joint)]
+        assert np.radians(-10.0) < angles.min() < angles.max() < np.radians(160.0)
+
+
+def test_the_t_pose_becomes_the_zero_pose(player, dribble):
+    """Except for the arms, which hang 8 degrees in CMU's T-pose and are straight out in ours."""
+    still = replace(
+        dribble,
+        rotations=np.tile(dribble.rest_rotations, (20, 1, 1)),
+        root_position=np.tile([0.0, 0.0, 1.0], (20, 1)),
+    )
+    reference = retarget(player, still, ik=False)
+    body_q = pose.forward(player, reference.joint_q)[10]
+    for body in ("pelvis", "torso", "head", "l_foot", "r_foot"):
+        turn = Rotation.from_quat(body_q[player.body(body), 3:])
+        assert np.degrees(turn.magnitude()) < 0.1, body
+    drop = body_q[player.body("l_upper_arm"), :3] - body_q[player.body("l_hand"), :3]
+    assert np.degrees(np.arctan2(drop[2], -drop[1])) == pytest.approx(8.0, abs=0.1)
+
+
+def test_an_unknown_joint_is_named(player, dribble):
+    names = tuple(n.replace("LeftFoot", "LFoot") for n in dribble.joint_names)
+    with pytest.raises(MappingError, match=r"cmu: bodies\.l_foot: no joint 'LeftFoot'"):
+        retarget(player, replace(dribble, joint_names=names), read_mapping("cmu"))
+    with pytest.raises(MappingError, match="cmu comes nearest, and lacks LeftFoot"):
+        retarget(player, replace(dribble, joint_names=names))
+
+
+def test_an_unknown_body_is_named(player, dribble):
+    cmu = read_mapping("cmu")
+    with pytest.raises(MappingError, match="no body 'tail'"):
+        retarget(player, dribble, replace(cmu, bodies=cmu.bodies | {"tail": "Hips"}))
+
+
+@pytest.mark.parametrize(
+    ("clip", "frames"),
+    [
+        ("cmu/06_12.bvh", (500, 800)),
+        ("cmu/02_01.bvh", (10, 300)),
+        ("cmu/09_01.bvh", (0, 120)),
+        ("ballplay_m/044_006pickle_lleg_2.pt", (0, 168)),
+        ("ballplay_m/001_007pickle_pick_011.pt", (80, 200)),
+    ],
+)
+def test_joints_feet_and_ground_keep_to_the_recording(player, mocap, clip, frames):
+    motion, _ = read_clip(mocap / clip)
+    fit = accuracy(player, retargeted(player, motion.slice(*frames)))
+    assert fit.mean < 0.041 and fit.limbs["hands"][0] < 0.03
+    assert fit.sliding < 0.005 and fit.off_ground < 0.01
+    assert max(fit.penetration, fit.body_penetration) < 0.005
+    assert fit.limits < 1e-6
+
+
+def test_palms_follow_recorded_knuckles(player, mocap):
+    motion, _ = read_clip(mocap / "ballplay_m" / "044_006pickle_lleg_2.pt")
+    body_q = pose.forward(player, retarget(player, motion).joint_q)
+    motion = motion.resample(1.0 / player.timestep)
+    across = [motion.positions[:, motion.index(f"R_{f}1")] for f in ("Index", "Pinky")]
+    ours = [body_q[:, player.body(f"r_{f}_1"), :3] for f in ("index", "pinky")]
+    a, b = across[0] - across[1], ours[0] - ours[1]
+    cosine = np.sum(a * b, axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
+    # 12 degrees are the shapes of the two palms
+    assert np.median(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))) < 13.0
+
+
+def in_other_frames(motion, seed=0):
+    """The same motion with every joint's own axes turned at random, its T-pose lost: LAFAN1's trouble."""
+    rng = np.random.default_rng(seed)
+    turns = Rotation.random(len(motion.joint_names), rng)
+    _, world = motion.forward()
+    _, rest_world = motion.rest()
+    frames = [Rotation.from_quat(world[:, j]) * turns[j] for j in range(len(motion.joint_names))]
+    rest = [Rotation.from_quat(rest_world[j]) * turns[j] for j in range(len(motion.joint_names))]
+    local, offsets, rest_local = [frames[0]], motion.offsets.copy(), [rest[0]]
+    for j in range(1, len(frames)):
+        parent = motion.parents[j]
+        local.append(frames[parent].inv() * frames[j])
+        rest_local.append(rest[parent].inv() * rest[j])
+        offsets[j] = turns[parent].inv().apply(motion.offsets[j])
+    stack = np.stack([r.as_quat() for r in local], axis=1)
+    return replace(
+        motion, rotations=stack, offsets=offsets, rest_rotations=np.stack([r.as_quat() for r in rest_local])
+    )
+
+
+def test_joint_frames_do_not_matter(player, dribble):
+    ours = retarget(player, dribble).joint_q
+    theirs = retarget(player, in_other_frames(dribble)).joint_q
+    assert np.abs(pose.forward(player, ours) - pose.forward(player, theirs))[..., :3].max() < 1e-6
+
+
+def test_a_t_pose_is_built_from_directions(player, dribble):
+    """LAFAN1's form: the pose at zero angles is no T-pose. Every bone of it lies along its joint's X axis."""
+    _, world = dribble.forward()
+    at_rest, _ = dribble.rest()
+    count = len(dribble.joint_names)
+    bones = [next((k for k in range(count) if dribble.parents[k] == j), None) for j in range(count)]
+    _, rest_world = dribble.rest()
+    turns = []
+    for j in range(count):
+        line = at_rest[bones[j]] - at_rest[j] if bones[j] is not None else np.zeros(3)
+        line = Rotation.from_quat(rest_world[j]).inv().apply(line)
+        x = line / np.linalg.norm(line) if np.linalg.norm(line) > 1e-9 else np.array([0.0, 0.0, 1.0])
+        left = np.array([0.0, 1.0, 0.0]) if abs(x[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
+        own = pose.frame_of(x, left)
+        turns.append(turns[0] if dribble.joint_names[j] in ("LHipJoint", "RHipJoint") else own)
+    frames = [Rotation.from_quat(world[:, j]) * turns[j] for j in range(count)]
+    local, offsets = [frames[0]], dribble.offsets.copy()
+    for j in range(1, count):
+        local.append(frames[dribble.parents[j]].inv() * frames[j])
+        offsets[j] = turns[dribble.parents[j]].inv().apply(dribble.offsets[j])
+    lying = replace(
+        dribble,
+        rotations=np.stack([r.as_quat() for r in local], axis=1),
+        offsets=offsets,
+        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+    )
+    mapping = replace(read_mapping("cmu"), rest="directions")
+    ours = pose.forward(player, retarget(player, dribble).joint_q)
+    theirs = pose.forward(player, retarget(player, lying, mapping).joint_q)
+    for body in ("pelvis", "torso", "head", "l_hand", "r_hand", "l_foot", "r_foot", "l_lower_leg"):
+        apart = np.linalg.norm((ours - theirs)[:, player.body(body), :3], axis=1)
+        assert apart.mean() < 0.05, body
+    plain = pose.forward(player, retarget(player, lying, read_mapping("cmu"), ik=False).joint_q)
+    assert np.linalg.norm((ours - plain)[:, player.body("head"), :3], axis=1).mean() > 0.2

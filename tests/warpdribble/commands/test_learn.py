@@ -1,0 +1,259 @@
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from warpdribble.cli import main
+from warpdribble.learning.methods.samcon import Samcon, SamconConfig
+from warpdribble.learning.runs import folder as runs
+from warpdribble.learning.runs.log import read_rows
+from warpdribble.skills.graph import skill_graph
+from warpdribble.skills.skill import parse_skill
+from warpdribble.takes.take import validate
+
+NAME = "dribble-right-authored"
+SMALL = SamconConfig(iterations=6, islands=4, particles=32, walk=60, check_every=3)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Learning that takes a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runs, "RunConfig", partial(runs.RunConfig, samcon=SMALL, trial_worlds=32))
+        yield
+
+
+@pytest.fixture(scope="module")
+def run(small, tmp_path_factory):
+    """The folder of a run that the command made."""
+    folder = tmp_path_factory.mktemp("learn") / "run"
+    assert main(["learn", NAME, "--out", str(folder)]) == 0
+    return folder
+
+
+def refused(capsys, *arguments):
+    """The one line on stderr of a command that has to fail with status 2."""
+    assert main([str(a) for a in arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("warpdribble: "), said
+    return said
+
+
+def evaluated(capsys, run, *arguments):
+    capsys.readouterr()
+    assert main(["evaluate", str(run), *arguments, "--format", "json"]) == 0
+    return json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+
+
+def test_learning_says_how_it_went_and_what_is_next(small, capsys, tmp_path):
+    out = tmp_path / "run"
+    assert main(["learn", NAME, "--out", str(out), "--iterations", "4"]) == 0
+    said = capsys.readouterr()
+    for words in (
+        "authored clip dribble_right",
+        "learned   4 iterations",
+        "% of the last trials survived",
+        "samples/s",
+        "% of the time outside the simulation",
+        f"warpdribble evaluate {out}",
+        f"warpdribble export {out}",
+    ):
+        assert words in said.out
+    checks = [line for line in said.err.splitlines() if line.startswith("iteration ")]
+    assert [line.split(":")[0] for line in checks] == ["iteration 3 of 4", "iteration 4 of 4"]
+    assert "survived, cost" in checks[0]
+    assert main(["learn", NAME, "--out", str(out), "--iterations", "5"]) == 0
+    assert "goes on   after 4 iterations" in capsys.readouterr().out
+    assert [row["iteration"] for row in read_rows(out)] == [1, 2, 3, 4, 5]
+
+
+def test_a_run_that_is_stopped_says_how_to_go_on(small, capsys, tmp_path, monkeypatch):
+    iterate = Samcon.iterate
+
+    def interrupted(self):
+        if self.iteration == 2:
+            raise KeyboardInterrupt
+        return iterate(self)
+
+    monkeypatch.setattr(Samcon, "iterate", interrupted)
+    assert main(["learn", NAME, "--out", str(tmp_path / "run")]) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("warpdribble: stopped after 2 iterations; saved in ")
+    assert said.endswith("the same command goes on")
+    said = refused(capsys, "evaluate", tmp_path / "run")
+    assert "no policy yet" in said and "let it go on" in said
+
+
+def test_an_evaluation_is_json(run, capsys):
+    report = evaluated(capsys, run, "--cycles", "2", "--trials", "20")
+    assert {"skill", "seed", "lived", "cost", "angle_error_deg", "end_error_cm"} < set(report)
+    assert (report["trials"], report["cycles"], report["seed"]) == (20, 2.0, 1)
+    assert report["skill"] == NAME and report["iterations"] == SMALL.iterations
+    assert type(report["survived"]) is int and 0 < report["survived"] <= 20
+    assert report["survived"] / 20 <= report["lived"] <= 1.0
+    assert 0.0 < report["drift_cm_per_cycle"] < 100.0 and 0.0 < report["angle_error_deg"] < 20.0
+    assert "pushes" not in report
+    assert report == evaluated(capsys, run, "--cycles", "2", "--trials", "20")
+    other = evaluated(capsys, run, "--cycles", "2", "--trials", "20", "--seed", "2")
+    assert other["cost"] != report["cost"]
+
+
+def test_what_there_is_no_number_for_is_null(run, capsys):
+    report = evaluated(capsys, run, "--cycles", "0.5", "--trials", "2")
+    assert report["drift_cm_per_cycle"] is None and report["angle_error_deg"] > 0.0
+
+
+def test_pushes_and_open_loop_are_harder(run, capsys):
+    few = ("--cycles", "5", "--trials", "32")
+    calm = evaluated(capsys, run, *few)
+    assert evaluated(capsys, run, *few, "--push", "1000")["lived"] < calm["lived"]
+    assert evaluated(capsys, run, *few, "--noise", "2")["lived"] < calm["lived"]
+    blind = evaluated(capsys, run, *few, "--open-loop")
+    assert blind["open_loop"] and blind["cost"] != calm["cost"]
+
+
+def test_a_table_of_pushes(run, capsys, monkeypatch):
+    """A force in which a direction is lost before the push is null in JSON and a dash to read."""
+    from warpdribble.learning.evaluate import pushes
+
+    shares = {10: [1.0] * 8, 20: [0.95] * 7 + [0.5], 30: [float("nan")] + [0.9] * 6 + [1.0], 40: [1.0] * 8}
+    monkeypatch.setattr(pushes, "FORCES", tuple(shares))
+    monkeypatch.setattr(pushes, "push_survival", lambda *a, **_: np.array(shares[a[3]]))
+    arguments = ("--cycles", "1", "--trials", "2", "--pushes")
+    table = evaluated(capsys, run, *arguments)["pushes"]
+    assert table["forces"] == [10, 20, 30] and len(table["directions"]) == 8
+    assert table["survived"][2][0] is None
+    assert list(table["largest"].values()) == [20.0] * 7 + [10.0]
+    assert table["largest_in_every_direction"] == 10.0
+    assert main(["evaluate", str(run), *arguments]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-3].split() == ["30", "-", *["90"] * 6, "100"]
+    assert "95 % survive 10 N in every direction" in lines[-1]
+
+
+def test_an_evaluation_to_read(run, capsys):
+    assert main(["evaluate", str(run), "--cycles", "0.5", "--trials", "4"]) == 0
+    said = capsys.readouterr().out
+    assert "survived  " in said and "drift     - and - a cycle" in said
+
+
+def test_an_export_is_a_valid_take_of_a_player_that_stands(run, capsys, tmp_path):
+    from pxr import Usd
+
+    out = tmp_path / "new" / "take.usdc"
+    assert main(["export", str(run), "--seconds", "1.5", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert validate(out) == [] and "151 frames at 100 fps, valid USD" in said
+    assert "falls     0" in said and "root free" in said
+    beside = ["take.html", "take.plots.png", "take.png", "take.usdc"]
+    assert sorted(p.name for p in out.parent.iterdir()) == beside
+    stage = Usd.Stage.Open(str(out))
+    assert not stage.GetPrimAtPath("/World/Ball")
+    place = stage.GetPrimAtPath("/World/Player/head").GetAttribute("xformOp:translate")
+    assert len(place.GetTimeSamples()) == 151
+    assert place.Get(150)[2] > 1.2
+
+
+def test_an_export_with_a_skin_and_a_fall(run, capsys, tmp_path):
+    out = tmp_path / "take.usdc"
+    arguments = ["--seconds", "6", "--push", "3000", "--skin", "--no-html", "--out", str(out)]
+    assert main(["export", str(run), *arguments]) == 0
+    said = capsys.readouterr().out
+    assert "first at" in said and "valid USD" in said
+    assert not out.with_suffix(".html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--iterations", "0"), "--iterations 0: give a number from 1"),
+        (("--iterations", "-4"), "--iterations -4"),
+        (("--seed", "-1"), "--seed -1"),
+        (("--device", "abacus"), "--device abacus: give cpu"),
+        (("--data", "nowhere"), "--data nowhere: no such folder"),
+        (("--stage", "flying"), "--help"),
+    ],
+)
+def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
+    assert said in refused(capsys, "learn", NAME, "--out", tmp_path / "run", *arguments)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("skill", "said"),
+    [
+        ("moonwalk", "no such skill; there are"),
+        ("gone.toml", "no such file"),
+        ("once.toml", "the skill 'mine' is not cyclic: locomotion is learned on cycles"),
+        ("lost.toml", "no file 'lost.bvh'"),
+    ],
+)
+def test_what_cannot_be_learned(capsys, tmp_path, monkeypatch, skill, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "once.toml").write_text('name = "mine"\nauthored = "waist"\n')
+    (tmp_path / "lost.toml").write_text('name = "mine"\nclip = "lost.bvh"\ncyclic = true\n')
+    assert said in refused(capsys, "learn", skill, "--out", "run")
+    assert not list(tmp_path.glob("run/*"))
+
+
+def test_folders_that_are_taken_are_left_alone(run, capsys, tmp_path):
+    said = refused(capsys, "learn", "waist", "--out", run)
+    assert f'another run: skill.name is "{NAME}" there and "waist" here; give another --out' in said
+    (tmp_path / "notes.txt").write_text("mine")
+    assert "holds no run (notes.txt)" in refused(capsys, "learn", NAME, "--out", tmp_path)
+    assert "is a file" in refused(capsys, "learn", NAME, "--out", tmp_path / "notes.txt")
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--cycles", "-3"), "--cycles -3: give a number from 0.1"),
+        (("--cycles", "nan"), "--cycles nan"),
+        (("--trials", "0"), "--trials 0: give a number from 1"),
+        (("--push", "-1"), "--push -1"),
+        (("--noise", "-1"), "--noise -1"),
+        (("--device", "abacus"), "--device abacus"),
+        (("--format", "xml"), "--help"),
+    ],
+)
+def test_what_cannot_be_evaluated_with(run, capsys, arguments, said):
+    assert said in refused(capsys, "evaluate", run, *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--seconds", "0"), "--seconds 0: give a number from 0.05 to 600"),
+        (("--seconds", "1e9"), "--seconds 1e+09"),
+        (("--push", "-1"), "--push -1"),
+        (("--out", "take.fbx"), "name the output with one of"),
+        (("--device", "abacus"), "--device abacus"),
+    ],
+)
+def test_what_cannot_be_exported(run, capsys, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    assert said in refused(capsys, "export", run, *arguments)
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+@pytest.mark.parametrize("command", ["evaluate", "export"])
+def test_folders_without_a_policy(capsys, tmp_path, command):
+    assert "no such folder" in refused(capsys, command, tmp_path / "none")
+    assert "holds no run" in refused(capsys, command, tmp_path)
+
+
+def test_a_cycle_that_is_too_short_is_said(tmp_path, cmu_clip):
+    text = f'name = "tick"\nclip = "{cmu_clip}"\nframes = [0, 12]\ncyclic = true\nball = false\n'
+    with pytest.raises(ValueError, match="too short"):
+        skill_graph(parse_skill(text, "tick.toml"))
+
+
+@pytest.mark.slow
+def test_the_dribble_is_learned(capsys, tmp_path):
+    run = tmp_path / "run"
+    assert main(["learn", NAME, "--out", str(run), "--iterations", "30"]) == 0
+    learned = evaluated(capsys, run, "--cycles", "30", "--trials", "64")
+    blind = evaluated(capsys, run, "--cycles", "30", "--trials", "64", "--open-loop")
+    assert learned["survived"] >= 48 and learned["survived"] > blind["survived"]

@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+
+from warpdribble.cli import main
+from warpdribble.sims import Model
+from warpdribble.sims.model import gaps, pose
+from warpdribble.skills.draft import draft
+from warpdribble.skills.skill import SkillError, is_skill, parse_skill, read_skill, skill_names
+from warpdribble.skills.staged import stage_skill
+
+SMALL = 'name = "mine"\nauthored = "waist"\ncyclic = true\n'
+
+
+@pytest.fixture(scope="module")
+def player():
+    return Model.load("player")
+
+
+def test_what_ships_reads():
+    names = skill_names()
+    assert {"carry", "dribble-right", "waist", "switch-hands", "run-dribble", "walk", "run"} <= set(names)
+    for name in names:
+        one = read_skill(name)
+        assert one.name == name and one.description
+        assert bool(one.clip) != bool(one.authored)
+
+
+@pytest.mark.parametrize("name", skill_names())
+def test_every_skill_plays(player, mocap, name):
+    one = stage_skill(player, read_skill(name), mocap)
+    assert (one.cycle is not None) == one.skill.cyclic
+    if name in ("walk", "run"):
+        assert one.ball is None
+    else:
+        assert one.ball.touch.any() and one.ball.checkpoints
+        assert one.ball.path.shape == (one.reference.frame_count, 3)
+        place = player.q_slice("ball").start
+        assert one.reference.joint_q[:, place : place + 3] == pytest.approx(one.ball.path)
+        assert one.ball.path[:, 2].min() > 0.1
+    feet = [player.body(f"{side}_{part}") for side in "lr" for part in ("foot", "toes")]
+    assert gaps.lowest_point(player, pose.forward(player, one.reference.joint_q), feet).min() > -0.006
+    if one.cycle is not None:
+        first, last = one.reference.joint_q[[0, -1]]
+        assert np.allclose(first[7:-7], last[7:-7], atol=1e-6)
+        assert one.cycle.repeat(player, 3).frame_count == 3 * (one.reference.frame_count - 1) + 1
+
+
+def test_a_mirrored_skill_changes_hands(player):
+    plain = stage_skill(player, parse_skill(SMALL.replace("waist", "dribble_right"), "a"))
+    twin = stage_skill(player, parse_skill(SMALL.replace("waist", "dribble_right") + "mirror = true\n", "a"))
+    assert plain.ball.touch[:, 1].any() and not plain.ball.touch[:, 0].any()
+    assert twin.ball.touch[:, 0].any() and not twin.ball.touch[:, 1].any()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SMALL + "speed = 2\n", "speed: unknown key"),
+        (SMALL.replace('"mine"', "3"), "name: should be a text"),
+        (SMALL.replace('name = "mine"\n', ""), "name: missing"),
+        (SMALL.replace('authored = "waist"\n', ""), "clip: give either clip or authored"),
+        (SMALL + 'clip = "a.bvh"\n', "clip: give either clip or authored"),
+        (SMALL + "frames = [9, 3]\n", "frames: 9 to 3 is no range"),
+        (SMALL + "frames = [0.5, 3]\n", "frames: should be the first"),
+        (SMALL + "mirror = 1\n", "mirror: should be true or false"),
+        (SMALL + "[contact]\nfoot = []\n", r"contact\.foot: unknown key"),
+        (SMALL + "[contact]\nleft = [[0.3, 0.1]]\n", r"contact\.left\[0\]: 0.3 to 0.1 s is no range"),
+        (SMALL + "[contact]\nleft = [[0.1, 0.3], [0.2, 0.4]]\n", r"contact\.left: 0.2 s begins before"),
+        (SMALL + "[contact]\ncheckpoints = [-1]\n", r"contact\.checkpoints\[0\]: should be a number"),
+        (SMALL + "[contact]\ncheckpoints = [nan]\n", r"contact\.checkpoints\[0\]: should be a number"),
+        (SMALL + "[contact]\nheights = [1.0]\n", r"contact\.heights: should have one number"),
+        ("name =", "not TOML"),
+    ],
+)
+def test_a_wrong_file_is_said_with_key_and_reason(text, said):
+    with pytest.raises(SkillError, match=f"^mine.toml: {said}"):
+        parse_skill(text, "mine.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SMALL.replace('authored = "waist"', 'clip = "gone.bvh"'), "clip: no file 'gone.bvh'"),
+        (SMALL.replace("waist", "moon"), "authored: no clip 'moon'; there are carry"),
+        (SMALL + "[contact]\nleft = [[9.0, 9.5]]\n", r"contact.left\[0\]: begins at 9.0 s"),
+        (SMALL + "[contact]\ncheckpoints = [9.0]\n", "contact.checkpoints: 9.0 s is beyond"),
+    ],
+)
+def test_a_skill_that_cannot_be_played_says_why(player, tmp_path, text, said):
+    with pytest.raises(SkillError, match=said):
+        stage_skill(player, parse_skill(text, "mine.toml"), tmp_path)
+
+
+def test_frames_beyond_the_clip_are_named(player, mocap):
+    one = parse_skill('name = "x"\nclip = "cmu/06_01.bvh"\nframes = [0, 99999]\n', "mine.toml")
+    with pytest.raises(SkillError, match=r"mine.toml: frames: 06_01.bvh: 0 99999 is not a range"):
+        stage_skill(player, one, mocap)
+
+
+def test_a_draft_is_a_skill_that_plays(player, mocap, tmp_path, monkeypatch):
+    monkeypatch.setenv("WARPDRIBBLE_DATA", str(mocap))
+    text = draft(player, mocap / "ballplay_m" / "044_006pickle_lleg_2.pt", name="legs")
+    one = parse_skill(text, "legs.toml")
+    assert one.clip == "ballplay_m/044_006pickle_lleg_2.pt" and one.cyclic
+    assert one.frames[0] == pytest.approx(54, abs=4) and one.frames[1] == pytest.approx(142, abs=4)
+    assert len(one.checkpoints) == len(one.heights) == 2
+    assert stage_skill(player, one).ball.touch.any()
+
+
+def test_names_are_told_from_clips(tmp_path):
+    assert is_skill("waist") and is_skill("my.toml") and is_skill("nonsense")
+    assert not is_skill("clip.bvh") and not is_skill(tmp_path)
+    with pytest.raises(SkillError, match="no such skill; there are behind-back"):
+        read_skill("nonsense")
+
+
+def test_the_commands(capsys, tmp_path, cmu_clip):
+    assert main(["skill", "list"]) == 0
+    assert "between-legs" in capsys.readouterr().out
+    assert main(["skill", "show", "switch-hands"]) == 0
+    assert "checkpoints: 0.5" in capsys.readouterr().out
+    assert main(["skill", "show", str(tmp_path / "none.toml")]) == 2
+    assert "no such file" in capsys.readouterr().err
+    assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.toml")]) == 0
+    assert read_skill(tmp_path / "d.toml").frames[0] >= 0
+    assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.txt")]) == 2
+    assert "a skill is a .toml file" in capsys.readouterr().err
+
+
+def test_motion_commands(capsys, cmu_clip):
+    assert main(["motion", "retarget", str(cmu_clip)]) == 0
+    out = capsys.readouterr().out
+    assert "hands" in out and "mapping cmu" in out
+    assert main(["motion", "cycles", str(cmu_clip), "--longest", "1.0"]) == 0
+    assert main(["motion", "cycles", str(cmu_clip), "--shortest", "3"]) == 2

@@ -1,0 +1,133 @@
+"""The tables of docs/retargeting.md, measured on a folder of recordings.
+
+    python -m warpdribble.reports.fit FOLDER [docs/retargeting.md]
+
+reads every clip below FOLDER, puts it on the player and writes the tables between the file's markers.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import reduce
+from operator import add
+from pathlib import Path
+
+import numpy as np
+
+from ..clips.read import SUFFIXES, read_clip
+from ..sims.ball.ball import inferred_ball
+from ..sims.ball.contact_score import score_contacts
+from ..sims.retarget.accuracy import LIMBS, accuracy
+from ..sims.retarget.retarget import retargeted
+from .markers import check_page, write_measured
+
+GOALS = {"mean": 4.0, "hands": 3.0, "slide": 5.0, "slide all": 5.0, "deep": 5.0}
+"""[cm], [cm], [mm/s], [mm]."""
+
+
+def measure(model, folder: Path, say=lambda line: None) -> tuple[list[dict], dict]:
+    """Rows of numbers, one per clip, and clip -> score of the inferred contacts where a ball was recorded."""
+    rows, scores = [], {}
+    for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
+        motion, _ = read_clip(path)
+        result = retargeted(model, motion)
+        copied = accuracy(model, retargeted(model, motion, ik=False))
+        fit = accuracy(model, result)
+        row = {
+            "clip": path.relative_to(folder).as_posix(),
+            "scale": result.scale,
+            "copied": 100 * copied.mean,
+            "mean": 100 * fit.mean,
+            "slide": 1000 * fit.sliding,
+            "slide all": 1000 * fit.sliding_all,
+            "slide99": 1000 * fit.sliding_worst,
+            "deep": 1000 * max(fit.penetration, fit.body_penetration),
+            "stands": 100 * fit.standing,
+        }
+        row |= {limb: 100 * fit.limbs[limb][0] for limb in LIMBS if limb in fit.limbs}
+        rows.append(row)
+        if motion.ball_held is not None:
+            ball = inferred_ball(model, result.reference)
+            held = motion.resample(1.0 / model.timestep).ball_held
+            touch = ball.touch.any(axis=1) if ball is not None else np.zeros_like(held)
+            scores[row["clip"]] = score_contacts(touch, held, model.timestep)
+        say(f"{row['clip']}: mean {row['mean']:.1f} cm, slide {row['slide']:.1f} mm/s")
+    return rows, scores
+
+
+def tables(rows: list[dict], scores: dict) -> str:
+    """Both tables as Markdown."""
+    return "\n".join([*_fit_lines(rows), "", *_contact_lines(scores)])
+
+
+def _fit_lines(rows: list[dict]) -> list[str]:
+    limbs = [limb for limb in LIMBS if limb in rows[0]]
+    lines = ["### Joints, feet and ground", "", f"{len(rows)} clips; misses of the goals in bold.", ""]
+    lines.append("| goal | clips that miss it | worst |\n|---|---|---|")
+    for key, what in (
+        ("mean", "mean joint error under 4 cm"),
+        ("hands", "hands under 3 cm"),
+        ("slide", "standing feet slide under 5 mm/s"),
+        ("slide all", "the same, mean of all touching points"),
+        ("deep", "under the ground by less than 5 mm"),
+    ):
+        worst = max(rows, key=lambda row: row[key])
+        late = sum(row[key] >= GOALS[key] for row in rows)
+        lines.append(f"| {what} | {late} of {len(rows)} | {worst[key]:.1f} ({worst['clip']}) |")
+    heads = ["clip", "scale", "copied only", "with IK", *limbs]
+    heads += ["slide", "99 %", "slide, all points", "deepest", "stands"]
+    lines += ["", f"| {' | '.join(heads)} |"]
+    lines.append("|---|" + "---:|" * (len(limbs) + 8))
+    for row in rows:
+        cells = [row["clip"], f"{row['scale']:.3f}", f"{row['copied']:.1f}", _cell(row, "mean")]
+        cells += [_cell(row, limb) for limb in limbs]
+        cells += [_cell(row, "slide"), f"{row['slide99']:.0f}", _cell(row, "slide all")]
+        cells += [_cell(row, "deep"), f"{row['stands']:.0f}"]
+        lines.append(f"| {' | '.join(cells)} |")
+    lines += ["", "Errors in cm, slide in mm/s, deepest point under the ground in mm, stands in % of frames."]
+    return lines
+
+
+def _contact_lines(scores: dict) -> list[str]:
+    if not scores:
+        return []
+    total = reduce(add, scores.values())
+    moving = {clip: s for clip, s in scores.items() if s.timing or s.missed}
+    good = sum(s.precision >= 0.9 and s.recall >= 0.9 for s in scores.values())
+    late = np.array(total.timing)
+    lines = [
+        "### Contacts of hand and ball",
+        "",
+        f"Over {len(scores)} clips with a recorded ball: precision {total.precision:.3f}, recall "
+        f"{total.recall:.3f} of contact frames within 50 ms; {good} clips have both at 0.9 or more. Of "
+        f"{len(late) + total.missed} beginnings and ends of contact, {len(late)} have an inferred one "
+        f"within 300 ms, off by {1000 * np.abs(late).mean():.0f} ms on average, "
+        f"by {1000 * np.median(late):+.0f} ms in the median (positive: too late).",
+        "",
+        "| clip | precision | recall | off by ms | edges missed |\n|---|---:|---:|---:|---:|",
+    ]
+    for clip, s in (moving | scores).items():
+        off = f"{1000 * np.mean(np.abs(s.timing)):.0f}" if s.timing else "-"
+        edges = len(s.timing) + s.missed
+        marks = [f"{v:.2f}" if v >= 0.9 else f"**{v:.2f}**" for v in (s.precision, s.recall)]
+        lines.append(f"| {clip} | {marks[0]} | {marks[1]} | {off} | {s.missed} of {edges} |")
+    return lines
+
+
+def _cell(row: dict, key: str) -> str:
+    text = f"{row[key]:.1f}"
+    return f"**{text}**" if key in GOALS and row[key] >= GOALS[key] else text
+
+
+def main(folder: Path, page: Path) -> None:
+    from ..sims import Model
+
+    check_page(page)
+    rows, scores = measure(Model.load("player"), folder, lambda line: print(line, flush=True))
+    write_measured(page, tables(rows, scores))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        raise SystemExit("usage: python -m warpdribble.reports.fit FOLDER [docs/retargeting.md]")
+    main(Path(sys.argv[1]), Path(sys.argv[2] if len(sys.argv) > 2 else "docs/retargeting.md"))

@@ -1,0 +1,30 @@
+"""Skills: a part of a clip, which hand has the ball when, and what becomes of it on a model."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazily
+
+if TYPE_CHECKING:
+    from .graph import skill_graph
+    from .skill import Skill, SkillError, parse_skill, read_skill, skill_names
+    from .staged import StagedSkill, stage_skill
+
+__all__ = [
+    "Skill",
+    "SkillError",
+    "StagedSkill",
+    "parse_skill",
+    "read_skill",
+    "skill_graph",
+    "skill_names",
+    "stage_skill",
+]
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        ".graph": "skill_graph",
+        ".skill": "Skill SkillError parse_skill read_skill skill_names",
+        ".staged": "StagedSkill stage_skill",
+    },
+)

@@ -1,0 +1,163 @@
+"""A skill becomes what is simulated and learned: a reference on the model, closed where it is cyclic, with
+its ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..clips.data import data_folder
+from ..clips.errors import ClipError
+from ..sims.ball.ball import Ball, ball_path, find_checkpoints, flights_of, inferred_ball, recorded_ball
+from ..sims.ball.hands import find_hands
+from ..sims.model import gaps, pose
+from ..sims.reference.mirror import mirrored, mirrored_ball
+from ..sims.reference.reference import BLEND, Cycle, Reference, close_cycle
+from ..sims.retarget.mapping import MappingError, find_mapping, read_mapping
+from ..sims.retarget.reach import lift_out
+from ..sims.retarget.retarget import retargeted
+from .skill import HANDS, Skill, SkillError
+
+
+@dataclass(frozen=True)
+class StagedSkill:
+    """A skill on a model."""
+
+    skill: Skill
+    reference: Reference
+    """Closed where the skill is cyclic: the last row begins the next cycle."""
+    cycle: Cycle | None
+    ball: Ball | None
+    """None where nothing shows a ball (walking, running)."""
+    notes: tuple[str, ...] = ()
+
+
+def find_clip(skill: Skill, data: str | Path | None = None) -> Path:
+    """Path of a skill's recording. data: folder of recordings, None for the usual one. Raises SkillError."""
+    own = Path(skill.clip)
+    folder = Path(data) if data else data_folder()
+    places = [own] if own.is_absolute() else [folder / own, Path(skill.source).parent / own]
+    for place in places:
+        if place.exists():
+            return place
+    raise SkillError(
+        skill.source, "clip", f"no file '{skill.clip}' in {folder}; `warpdribble fetch` gets the recordings"
+    )
+
+
+def stage_skill(model, skill: Skill, data: str | Path | None = None) -> StagedSkill:
+    """The skill on a model. Raises SkillError for a clip that is missing or cannot be used."""
+    if skill.authored:
+        reference, ball, notes = _authored(model, skill)
+    else:
+        reference, ball, notes = _recorded(model, skill, data)
+    if not skill.ball:
+        ball = None
+    elif skill.contact or skill.checkpoints:
+        ball = _as_written(model, skill, reference, ball)
+    if skill.mirror:
+        reference = mirrored(model, reference)
+        ball = mirrored_ball(ball) if ball is not None else None
+    cycle = None
+    if skill.cyclic:
+        cycle = Cycle(reference) if skill.authored else _closed(model, reference)
+        if ball is not None and not skill.authored:
+            ball = _closed_ball(model, ball, cycle)
+        reference = cycle.reference
+    if ball is not None and "ball" in model.joint_names and not skill.authored:
+        joint_q = reference.joint_q.copy()
+        joint_q[:, model.q_slice("ball")][:, :3] = ball.path
+        reference = replace(reference, joint_q=joint_q)
+        cycle = replace(cycle, reference=reference) if cycle is not None else None
+    return StagedSkill(skill, reference, cycle, ball, tuple(notes))
+
+
+def _authored(model, skill: Skill):
+    from ..sims.authored.catalogue import AUTHORED, authored_clip
+
+    if skill.authored not in AUTHORED:
+        known = ", ".join(AUTHORED)
+        raise SkillError(skill.source, "authored", f"no clip '{skill.authored}'; there are {known}")
+    clip = authored_clip(model, skill.authored)
+    return clip.reference, clip.ball, [f"authored clip {skill.authored}"]
+
+
+def _recorded(model, skill: Skill, data):
+    from ..clips.read import read_part
+
+    path = find_clip(skill, data)
+    try:
+        motion, notes = read_part(path, skill.frames, skill.repairs)
+    except ClipError as error:
+        key = "frames" if "is not a range" in error.reason else "clip"
+        raise SkillError(skill.source, key, f"{path.name}: {error.reason.replace('--frames ', '')}") from None
+    except ValueError as error:
+        raise SkillError(skill.source, "repairs", str(error)) from None
+    try:
+        mapping = read_mapping(skill.mapping) if skill.mapping else find_mapping(motion)
+        result = retargeted(model, motion, mapping)
+    except MappingError as error:
+        raise SkillError(skill.source, "mapping", str(error)) from None
+    ball = recorded_ball(model, result, motion)
+    if ball is None or not ball.touch.any():
+        ball = inferred_ball(model, result.reference)
+    return result.reference, ball, notes
+
+
+def _closed(model, reference: Reference) -> Cycle:
+    """The cycle, with feet that closing has bent into the ground lifted out of it."""
+    cycle = close_cycle(model, reference)
+    joint_q = cycle.reference.joint_q.copy()
+    for knee in (n for n in ("l_knee", "r_knee") if n in model.joint_names):
+        foot = pose.limb_bodies(model, knee)[2]
+        lift_out(model, joint_q, knee, None, gaps.descendants(model, foot))
+    return replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
+
+
+def _closed_ball(model, ball: Ball, cycle: Cycle) -> Ball:
+    """The ball of a closed cycle: with the closed hands where it was inferred, bent to where it begins where
+    it was recorded."""
+    reference = cycle.reference
+    if not ball.recorded:
+        return replace(ball, path=ball_path(find_hands(model, reference), ball.touch, ball.flights))
+    anchor = reference.joint_q[0, :2]
+    goal = ball.path[0].copy()
+    turn = np.array([[np.cos(cycle.turn), -np.sin(cycle.turn)], [np.sin(cycle.turn), np.cos(cycle.turn)]])
+    goal[:2] = turn @ (goal[:2] - anchor) + anchor + cycle.travel
+    before = reference.duration - reference.timestep * np.arange(reference.frame_count)
+    share = np.clip(1.0 - before / min(BLEND, 0.5 * reference.duration), 0.0, 1.0)[:, None]
+    path = ball.path + share**2 * (3.0 - 2.0 * share) * (goal - ball.path[-1])
+    path[:, 2] = np.maximum(path[:, 2], ball.path[:, 2].min())
+    return replace(ball, path=path)
+
+
+def _as_written(model, skill: Skill, reference: Reference, ball: Ball | None) -> Ball:
+    """The ball with the contacts, checkpoints and heights that the file gives."""
+    times = reference.timestep * np.arange(reference.frame_count)
+    touch = np.zeros((len(times), 2), bool)
+    for hand, name in enumerate(HANDS):
+        for i, (start, end) in enumerate(skill.contact.get(name, ())):
+            if start > reference.duration:
+                reason = f"begins at {start} s, the clip lasts {reference.duration:.3f} s"
+                raise SkillError(skill.source, f"contact.{name}[{i}]", reason)
+            touch[:, hand] |= (times >= start - 1e-9) & (times <= end + 1e-9)
+    if not skill.contact and ball is not None:
+        touch = ball.touch
+    late = [t for t in skill.checkpoints if t > reference.duration + reference.timestep]
+    if late:
+        reason = f"{late[0]} s is beyond the clip, which lasts {reference.duration:.3f} s"
+        raise SkillError(skill.source, "contact.checkpoints", reason)
+    hands = find_hands(model, reference)
+    recorded = ball is not None and ball.recorded
+    flights = ball.flights if recorded else flights_of(touch)
+    path = ball.path if recorded else ball_path(hands, touch, flights)
+    if skill.checkpoints:
+        rows = tuple(min(round(t / reference.timestep), len(times) - 1) for t in skill.checkpoints)
+    else:
+        rows = find_checkpoints(path[:, 2], touch)
+    heights = skill.heights or tuple(
+        float(hands.centre[row, touch[row] if touch[row].any() else [True, True], 2].mean()) for row in rows
+    )
+    return Ball(path, touch, rows, heights, flights, recorded)

@@ -1,0 +1,1 @@
+"""One smooth body over the player's shapes."""

@@ -1,0 +1,21 @@
+"""Takes out: USD with physics, contact sheets and plots."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import lazily
+
+if TYPE_CHECKING:
+    from .plots import write_plots
+    from .sheet import write_sheet
+    from .take import Take, TakeError, validate, write_take
+
+__all__ = ["Take", "TakeError", "validate", "write_plots", "write_sheet", "write_take"]
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        ".plots": "write_plots",
+        ".sheet": "write_sheet",
+        ".take": "Take TakeError validate write_take",
+    },
+)

@@ -1,0 +1,176 @@
+"""A take as one HTML file that plays it: any browser, no server, nothing to download.
+
+Motion goes in as integers (a position in 65 535 steps of the take's extent, well below a millimetre on a
+court; a quaternion in 1/32 767), shapes as the meshes of the USD take; three.js (MIT, `assets/replay`) draws
+them.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..skin import meshes
+from ..takes import crowd, figure, scene
+from ..takes.take import Take, TakeError, check_writable, written_whole
+
+MOST_WORLDS = 64
+"""Worlds that are shown at most, the first ones of a take."""
+
+
+class Blocks:
+    """Arrays in one run of bytes, each at a multiple of 4."""
+
+    def __init__(self):
+        self.data = bytearray()
+
+    def add(self, values: np.ndarray, kind: str) -> dict:
+        """Where an array stands: {at, count, kind}. kind: "f4", "u2", "i2", "i1", "u1", "u4"."""
+        self.data += b"\0" * (-len(self.data) % 4)
+        values = np.ascontiguousarray(values, f"<{kind}").ravel()
+        place = {"at": len(self.data), "count": len(values), "kind": kind}
+        self.data += values.tobytes()
+        return place
+
+
+def write_replay(
+    path: str | Path,
+    take: Take,
+    contacts: dict[str, np.ndarray] | None = None,
+    title: str = "",
+    *,
+    skin: bool = False,
+    spacing: float = 3.0,
+    start: float = 0.0,
+) -> Path:
+    """Write a take as .html; the file appears whole or not at all. Raises TakeError.
+
+    contacts: name -> (frames,) bool, a strip each above the scrub bar. skin: the smooth body of `skin.of`.
+    start: [s] where it opens.
+    """
+    path = check_writable(path, (".html",))
+    if skin and take.model is None:
+        raise TakeError(path, "a skin needs the take's model")
+    from ..assets import path as asset
+
+    blocks = Blocks()
+    said = _describe(take, contacts or {}, title, skin, spacing, start, blocks)
+    parts = {
+        "TITLE": html.escape(title or "take"),
+        "THREE": asset("replay/three.js").read_text(encoding="utf-8"),
+        "TAKE": json.dumps(said).replace("</", "<\\/"),
+        "DATA": base64.b64encode(bytes(blocks.data)).decode(),
+        "REPLAY": asset("replay/replay.js").read_text(encoding="utf-8"),
+    }
+    page = asset("replay/page.html").read_text(encoding="utf-8")
+    pieces = page.split("@")
+    text = "".join(parts.get(piece, piece) for piece in pieces)
+    try:
+        with written_whole(path) as part:
+            part.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
+    return path
+
+
+def _describe(take: Take, contacts, title, skin, spacing, start, blocks: Blocks) -> dict:
+    worlds = np.asarray(take.worlds[:MOST_WORLDS], float)
+    count, frames, bodies = worlds.shape[:3]
+    places, turns = worlds[..., :3], np.stack([figure.continuous_quaternions(w[..., 3:]) for w in worlds])
+    low, packed, size = _steps(places)
+    offsets = crowd.layout(count, spacing if count > 1 else 0.0)
+    player = [i for i, name in enumerate(take.body_names) if name != take.ball]
+    reach = 3.5 if count == 1 else float(np.abs(offsets).max()) + 2.5
+    return {
+        "title": title,
+        "fps": float(take.fps),
+        "frames": frames,
+        "bodies": bodies,
+        "worlds": count,
+        "root": player[0] if player else 0,
+        "reach": reach,
+        "start": float(start),
+        "offsets": np.round(offsets, 4).tolist(),
+        "contacts": {str(k): _spans(v, take.fps) for k, v in contacts.items()},
+        "motion": {
+            "low": low,
+            "size": size,
+            "places": blocks.add(packed, "u2"),
+            "turns": blocks.add(np.round(turns * 32767), "i2"),
+        },
+        "meshes": _meshes(take, skin, float(np.abs(places[..., :2]).max()) + reach, blocks),
+        "skin": _skin(take, blocks) if skin else None,
+    }
+
+
+def _spans(on, fps: float) -> list[list[float]]:
+    """Begin and end [s] of each run of frames in which something holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(on, int), [0]]))).reshape(-1, 2)
+    return np.round(edges / fps, 4).tolist()
+
+
+def _steps(values: np.ndarray) -> tuple[list, np.ndarray, list]:
+    """values (..., 3) as low (3,), whole numbers from 0 to 65 535, and size (3,)."""
+    low = values.reshape(-1, 3).min(axis=0)
+    size = np.maximum(values.reshape(-1, 3).max(axis=0) - low, 1e-9)
+    return low.tolist(), np.round((values - low) / size * 65535), size.tolist()
+
+
+def _mesh(mesh: meshes.Mesh, colour, blocks: Blocks) -> dict:
+    low, packed, size = _steps(mesh.points)
+    kind = "u2" if len(mesh.points) < 65536 else "u4"
+    return {
+        "colour": [float(c) for c in colour[:3]],
+        "low": low,
+        "size": size,
+        "points": blocks.add(packed, "u2"),
+        "normals": blocks.add(np.round(mesh.normals * 127), "i1"),
+        "faces": blocks.add(mesh.faces, kind),
+    }
+
+
+def _meshes(take: Take, skin: bool, reach: float, blocks: Blocks) -> list[dict]:
+    """What is rigid: body (-1 = the world) and mesh."""
+    made = []
+    for mesh, colour in scene.court(reach):
+        made.append({"body": -1} | _mesh(mesh, colour, blocks))
+    for body in range(-1, len(take.body_names)):
+        ball = body >= 0 and take.body_names[body] == take.ball
+        if skin and body >= 0 and not ball:
+            continue
+        shapes = [s for s in take.shapes if s.body == body and s.kind != "plane"]
+        for part, colour in figure.coloured(shapes, seams=ball):
+            made.append({"body": body} | _mesh(part, colour, blocks))
+    return made
+
+
+def _skin(take: Take, blocks: Blocks) -> dict:
+    """A skinned mesh per region; bones are bodies, by index."""
+    from ..skin import skin
+
+    built = skin.of(take.model)
+    inverse = np.tile(np.eye(4), (len(built.bind_q), 1, 1))
+    back = Rotation.from_quat(built.bind_q[:, 3:]).inv()
+    inverse[:, :3, :3] = back.as_matrix()
+    inverse[:, :3, 3] = -back.apply(built.bind_q[:, :3])
+    parts = []
+    for number, region in enumerate(built.regions):
+        chosen = built.region == number
+        used = np.unique(built.mesh.faces[chosen])
+        part = _mesh(meshes.faces_of(built.mesh, chosen), built.colours[region], blocks)
+        part["bones"] = blocks.add(built.bodies[used], "u2")
+        part["weights"] = blocks.add(_whole(built.weights[used]), "u1")
+        parts.append(part)
+    return {"inverse": inverse.transpose(0, 2, 1).reshape(-1, 16).round(6).tolist(), "parts": parts}
+
+
+def _whole(weights: np.ndarray) -> np.ndarray:
+    """Weights as whole numbers that add up to 255; the first, largest one takes the rest."""
+    whole = np.round(255 * weights)
+    whole[:, 0] += 255 - whole.sum(axis=1)
+    return whole
