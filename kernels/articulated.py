@@ -39,7 +39,7 @@ def take_out(
 ) -> Body:
     """Take dof j out of a body: U = I s, D its diagonal, `force` the net force along it, v its velocity,
     V what the dofs before it give."""
-    d = 1.0 / root(D)
+    d = 1.0 / sqrt(D)
     U = d * U
     e = d * force
     world.U[g, j] = U
@@ -121,10 +121,10 @@ def ball_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     sz = column(R, 2)
     halt = Push(fill(0.0), fill(0.0))
     if tree.link_limited[i] != 0:
-        if any_lt(size(q.w), fill(tree.link_near[i])):
+        if any_lt(abs(q.w), fill(tree.link_near[i])):
             turned = logarithm(q)
             angle = norm(turned)
-            axes = frame((1.0 / most(angle, fill(1.0e-6))) * turned)
+            axes = frame((1.0 / max(angle, fill(1.0e-6))) * turned)
             n = row(axes, 0)
             s = R * n
             halt = stop(tree, tree.link_upper[i] - angle, dot(n, v), dot(s, b.I.A * s) + drive.load)
@@ -200,8 +200,8 @@ def velocities(tree: Tree, world: World, g: int):
         V = shift_motion(world.V[g, tree.link_parent[i]], world.r[g, i])
         if joint == HINGE:
             v = rate(world, g, j, V)
-            fast = where_lt(top, size(v), one, fast)
-            v = most(neg(top), least(top, v))
+            fast = where_lt(top, abs(v), one, fast)
+            v = max(neg(top), min(top, v))
             world.qd[g, j] = v
             V.w = V.w + v * world.s[g, j]
         else:
@@ -218,7 +218,7 @@ def velocities(tree: Tree, world: World, g: int):
             turn_rate = V.w - before
             speed = norm(turn_rate)
             fast = where_lt(top, speed, one, fast)
-            turn_rate = where_lt(top, speed, top / most(speed, one), one) * turn_rate
+            turn_rate = where_lt(top, speed, top / max(speed, one), one) * turn_rate
             V.w = before + turn_rate
             store3(world.qd, g, j, mul_t(world.R[g, i], turn_rate))
         world.V[g, i] = V

@@ -38,9 +38,9 @@ def bounce(tree: Tree, world: World, g: int, i: int, slot: int, touch: Touch, fr
 
     # fall: gap + u t + an t^2 / 2 = 0
     u = dot(n, v) + 0.5 * h * an
-    gap = most(touch.gap, fill(0.0))
+    gap = max(touch.gap, fill(0.0))
     inside = u * u - 2.0 * an * gap
-    t = 2.0 * gap / most(root(most(inside, fill(0.0))) - u, fill(1.0e-9))
+    t = 2.0 * gap / max(sqrt(max(inside, fill(0.0))) - u, fill(1.0e-9))
     strike = u + an * t
     zero = fill(0.0)
     one = fill(1.0)
@@ -59,7 +59,7 @@ def bounce(tree: Tree, world: World, g: int, i: int, slot: int, touch: Touch, fr
     stick = 1.0 / (1.0 / mass + (radius * radius) / moment)
     grip = world.friction[g, pair] * (1.0 + e) * mass * neg(strike)
     wanted = stick * norm(slip)
-    J = neg(where_lt(grip, wanted, grip / most(wanted, fill(1.0e-12)), one) * stick) * slip
+    J = neg(where_lt(grip, wanted, grip / max(wanted, fill(1.0e-12)), one) * stick) * slip
     vt_new = vt + t * at + (1.0 / mass) * J
     spin_new = spin - (radius / moment) * cross(n, J)
 

@@ -40,7 +40,7 @@ class Character:
 @wp.func
 def facing(R: Mat3, a: Vec3) -> Vec3:
     """A vector of the world in the facing frame of a root that is turned by R."""
-    k = 1.0 / most(root(R.xx * R.xx + R.yx * R.yx), fill(1.0e-6))
+    k = 1.0 / max(sqrt(R.xx * R.xx + R.yx * R.yx), fill(1.0e-6))
     cos = k * R.xx
     sin = k * R.yx
     return Vec3(cos * a.x + sin * a.y, cos * a.y - sin * a.x, a.z)
@@ -70,7 +70,7 @@ def miss(
     iv = tree.link_dof[i]
     if tree.link_joint[i] == HINGE:
         angle = world.q[g, iq] - choose(q, rows, g, 0, iq)
-        return Miss(size(angle), size(world.qd[g, iv] - choose(qd, rows, g, 0, iv)))
+        return Miss(abs(angle), abs(world.qd[g, iv] - choose(qd, rows, g, 0, iv)))
     goal = Quat(
         choose(q, rows, g, 0, iq),
         choose(q, rows, g, 0, iq + 1),

@@ -23,7 +23,7 @@ def between(near: Vec3, far: Vec3, radius_a: float, radius_b: float) -> Touch:
     distance = norm(apart)
     up = Vec3(fill(0.0), fill(0.0), fill(1.0))
     tiny = fill(1.0e-9)
-    n = where_lt(tiny, distance, (1.0 / most(distance, tiny)) * apart, up)
+    n = where_lt(tiny, distance, (1.0 / max(distance, tiny)) * apart, up)
     gap = distance - (radius_a + radius_b)
     return Touch(gap, near + (radius_a + 0.5 * gap) * n, n)
 
@@ -52,8 +52,8 @@ def sphere_capsule(tree: Tree, world: World, g: int, slot: int) -> Touch:
     x = centre(tree, world, g, a)
     s = centre(tree, world, g, b)
     axis = rotate(world.R[g, tree.shape_link[a]], tree.shape_half[a])
-    t = dot(s - x, axis) / most(dot(axis, axis), fill(1.0e-12))
-    t = most(fill(-1.0), least(fill(1.0), t))
+    t = dot(s - x, axis) / max(dot(axis, axis), fill(1.0e-12))
+    t = max(fill(-1.0), min(fill(1.0), t))
     return between(x + t * axis, s, tree.shape_radius[a], tree.shape_radius[b])
 
 
@@ -69,15 +69,15 @@ def capsule_capsule(tree: Tree, world: World, g: int, slot: int) -> Touch:
     d = xb - xa
     one = fill(1.0)
     tiny = fill(1.0e-12)
-    uu = most(dot(u, u), tiny)
-    vv = most(dot(v, v), tiny)
+    uu = max(dot(u, u), tiny)
+    vv = max(dot(v, v), tiny)
     uv = dot(u, v)
-    s = (dot(d, u) * vv - dot(d, v) * uv) / most(uu * vv - uv * uv, 1.0e-6 * (uu * vv))
-    s = most(neg(one), least(one, s))
+    s = (dot(d, u) * vv - dot(d, v) * uv) / max(uu * vv - uv * uv, 1.0e-6 * (uu * vv))
+    s = max(neg(one), min(one, s))
     t = (s * uv - dot(d, v)) / vv
-    t = most(neg(one), least(one, t))
+    t = max(neg(one), min(one, t))
     s = (t * uv + dot(d, u)) / uu
-    s = most(neg(one), least(one, s))
+    s = max(neg(one), min(one, s))
     return between(xa + s * u, xb + t * v, tree.shape_radius[a], tree.shape_radius[b])
 
 
@@ -92,27 +92,27 @@ def sphere_box(tree: Tree, world: World, g: int, slot: int) -> Touch:
     half = vec3(tree.shape_half[a])
     # outside: from the nearest point of the box
     c = Vec3(
-        most(neg(half.x), least(half.x, x.x)),
-        most(neg(half.y), least(half.y, x.y)),
-        most(neg(half.z), least(half.z, x.z)),
+        max(neg(half.x), min(half.x, x.x)),
+        max(neg(half.y), min(half.y, x.y)),
+        max(neg(half.z), min(half.z, x.z)),
     )
     d = x - c
     distance = norm(d)
     # inside: out through the nearest face
     zero = fill(0.0)
-    px = half.x - size(x.x)
-    py = half.y - size(x.y)
-    pz = half.z - size(x.z)
-    depth = least(px, least(py, pz))
+    px = half.x - abs(x.x)
+    py = half.y - abs(x.y)
+    pz = half.z - abs(x.z)
+    depth = min(px, min(py, pz))
     one = fill(1.0)
     sx = where_lt(x.x, zero, neg(one), one)
     sy = where_lt(x.y, zero, neg(one), one)
     sz = where_lt(x.z, zero, neg(one), one)
     z_or = Vec3(zero, zero, sz)
     y_or = where_lt(pz, py, z_or, Vec3(zero, sy, zero))
-    face = where_lt(least(py, pz), px, y_or, Vec3(sx, zero, zero))
+    face = where_lt(min(py, pz), px, y_or, Vec3(sx, zero, zero))
     tiny = fill(1.0e-7)
-    n = where_lt(tiny, distance, (1.0 / most(distance, tiny)) * d, face)
+    n = where_lt(tiny, distance, (1.0 / max(distance, tiny)) * d, face)
     out = where_lt(tiny, distance, distance, neg(depth))
     gap = out - tree.shape_radius[b]
     n = R * n

@@ -155,13 +155,13 @@ def respond(tree: Tree, world: World, g: int, slot: int, at: int):
     cn = b.x * b.z - b.y * b.y
     ct = a.z * b.y - a.y * b.z
     cs = a.y * b.y - a.z * b.x
-    scale = 1.0 / most(nn * cn + a.y * ct + a.z * cs, fill(1.0e-24))
+    scale = 1.0 / max(nn * cn + a.y * ct + a.z * cs, fill(1.0e-24))
     world.y[g, at + 2] = scale * Vec3(cn, ct, cs)
     world.y[g, at + 3] = scale * Vec3(nn * b.z - a.z * a.z, a.y * a.z - nn * b.y, nn * b.x - a.y * a.y)
     # the softened normal, and the longest stable step along a tangent: 1 / its larger eigenvalue
     skew = 0.5 * (b.x - b.z)
-    stiff = 0.5 * (b.x + b.z) + root(skew * skew + b.y * b.y)
-    world.y[g, at + 4] = Vec3(nn, 1.0 / most(stiff, fill(1.0e-12)), stiff)
+    stiff = 0.5 * (b.x + b.z) + sqrt(skew * skew + b.y * b.y)
+    world.y[g, at + 4] = Vec3(nn, 1.0 / max(stiff, fill(1.0e-12)), stiff)
 
 
 @wp.func
@@ -198,10 +198,10 @@ def wish(tree: Tree, world: World, g: int, slot: int, gap: Real, u: Real, lively
     pair = tree.slot_pair[slot]
     zero = fill(0.0)
     close = (-1.0 / h) * gap
-    goal = where_lt(zero, gap, close, least(tree.pair_erp[pair] * close, fill(PUSH_LIMIT)))
+    goal = where_lt(zero, gap, close, min(tree.pair_erp[pair] * close, fill(PUSH_LIMIT)))
     back = where_lt(u, fill(-BOUNCE_SPEED), neg(world.restitution[g, pair] * u), goal)
     back = where_lt(gap + h * u, zero, back, goal)
-    return where_lt(zero, lively, most(goal, back), goal)
+    return where_lt(zero, lively, max(goal, back), goal)
 
 
 @wp.func
@@ -250,8 +250,8 @@ def find(tree: Tree, world: World, g: int):
             if any_lt(near, margin):
                 a = tree.slot_link_a[slot]
                 b = tree.slot_link_b[slot]
-                world.touched[g, a] = least(world.touched[g, a], near)
-                world.touched[g, b] = least(world.touched[g, b], near)
+                world.touched[g, a] = min(world.touched[g, a], near)
+                world.touched[g, b] = min(world.touched[g, b], near)
                 goal = wish(tree, world, g, slot, touch.gap, dot(touch.normal, v), far)
                 enlist(tree, world, g, slot, touch, near, goal)
             else:
@@ -307,15 +307,15 @@ def settle(world: World, g: int, at: int, u: Vec3, old: Vec3, goal: Real, fricti
     n = c.x * n0 + c.y * t0 + c.z * s0
     t = c.y * n0 + d.x * t0 + d.y * s0
     s = c.z * n0 + d.y * t0 + d.z * s0
-    grip = friction * most(n, zero)
+    grip = friction * max(n, zero)
     slips = t * t + s * s - grip * grip
     # slipping: against the slip, by as long a step as is stable
     dt = old.y - more.y * u.y
     ds = old.z - more.y * u.z
-    unit = 1.0 / root(most(dt * dt + ds * ds, fill(1.0e-24)))
+    unit = 1.0 / sqrt(max(dt * dt + ds * ds, fill(1.0e-24)))
     dt = unit * dt
     ds = unit * ds
-    n_slip = most(n0, zero) / most(more.x + friction * (a.y * dt + a.z * ds), 0.5 * more.x)
+    n_slip = max(n0, zero) / max(more.x + friction * (a.y * dt + a.z * ds), 0.5 * more.x)
     grip = friction * n_slip
     return Vec3(
         where_lt(slips, zero, n, n_slip),
@@ -339,16 +339,16 @@ def residual(tree: Tree, world: World, g: int) -> Real:
         pair = tree.slot_pair[slot]
         soft = tree.pair_cfm[pair] / tree.h
         nn = world.y[g, at].x
-        n = most(fill(0.0), x.x - (u.x + soft * x.x - world.goal[g, slot]) / nn)
+        n = max(fill(0.0), x.x - (u.x + soft * x.x - world.goal[g, slot]) / nn)
         stiff = world.y[g, at + 4].z
         t = x.y - u.y / stiff
         s = x.z - u.z / stiff
         grip = world.friction[g, pair] * x.x
-        back = least(grip / root(most(t * t + s * s, fill(1.0e-24))), fill(1.0))
+        back = min(grip / sqrt(max(t * t + s * s, fill(1.0e-24))), fill(1.0))
         t = back * t - x.y
         s = back * s - x.z
-        worst = most(worst, nn * size(n - x.x))
-        worst = most(worst, stiff * root(t * t + s * s))
+        worst = max(worst, nn * abs(n - x.x))
+        worst = max(worst, stiff * sqrt(t * t + s * s))
     return worst
 
 

@@ -85,12 +85,12 @@ def judge(tree: Tree, world: World, g: int, i: int, v: Vec3, trial: int) -> Real
     stays = where_lt(zero, dot(end, world.torque[g, i]), one, zero)
     now = where_lt(limit, length, where_lt(half, was, stays, one), zero)
     if trial == LAST_TRIAL:
-        now = least(now, was)
+        now = min(now, was)
     turns = where_lt(half, now, where_lt(was, half, one, zero), zero)
-    aim = (limit / most(length, fill(1.0e-20))) * end
+    aim = (limit / max(length, fill(1.0e-20))) * end
     world.torque[g, i] = where_lt(zero, turns, aim, world.torque[g, i])
     world.full[g, i] = now
-    return size(now - was)
+    return abs(now - was)
 
 
 @wp.func
@@ -114,7 +114,7 @@ def stop(tree: Tree, room: Real, v: Real, weight: Real) -> Push:
     the joint's articulated inertia. Nothing where the limit is not reached within the step."""
     h = tree.h
     load = LIMIT_WEIGHT * weight
-    past = least(room, fill(0.0))
+    past = min(room, fill(0.0))
     # short of it: v+ = room / h; past it: v+ = LIMIT_ERP room / h
     f = (1.0 / (h * h)) * load * (LIMIT_ERP * past + (room - past) - h * v)
     over = h * v - room

@@ -126,11 +126,11 @@ def where_lt(a: Real, b: Real, x: Real, y: Real) -> Real:
 
 
 @wp.func_native(_native("a_ < b_ ? a_ : b_", "ab"))
-def least(a: Real, b: Real) -> Real: ...
+def min(a: Real, b: Real) -> Real: ...
 
 
 @wp.func_native(_native("a_ < b_ ? b_ : a_", "ab"))
-def most(a: Real, b: Real) -> Real: ...
+def max(a: Real, b: Real) -> Real: ...
 
 
 _ANY = (
@@ -155,13 +155,13 @@ _ABS = "fabsf(a_)" if LANES == 1 else "__builtin_elementwise_abs(a_)"
 
 
 @wp.func_native(_native(_SQRT, "a"))
-def root(a: Real) -> Real:
+def sqrt(a: Real) -> Real:
     """Square root."""
     ...
 
 
 @wp.func_native(_native(_ABS, "a"))
-def size(a: Real) -> Real:
+def abs(a: Real) -> Real:
     """Absolute value."""
     ...
 
@@ -197,7 +197,7 @@ def sin_cos(a: Real) -> SinCos:
         (2.443315711809948e-5 * z - 1.388731625493765e-3) * z + 4.166664568298827e-2
     )
     turn = k - 4.0 * nearest(0.25 * k)  # the quadrant, -2 .. 2
-    odd = size(size(turn) - 1.0)  # 0 in the quadrants where sine and cosine change places
+    odd = abs(abs(turn) - 1.0)  # 0 in the quadrants where sine and cosine change places
     half = fill(0.5)
     sine = where_lt(odd, half, c, s)
     cosine = where_lt(odd, half, s, c)
@@ -210,8 +210,8 @@ def sin_cos(a: Real) -> SinCos:
 @wp.func
 def arc_tangent(y: Real, x: Real) -> Real:
     """Angle [rad] in [0, pi / 2] of the point (x, y) with x, y >= 0; 0 at the origin."""
-    low = least(x, y)
-    high = most(most(x, y), fill(1.0e-30))
+    low = min(x, y)
+    high = max(max(x, y), fill(1.0e-30))
     t = low / high
     bend = fill(0.4142135623730950)
     z = where_lt(bend, t, (t - 1.0) / (t + 1.0), t)

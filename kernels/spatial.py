@@ -143,7 +143,7 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 @wp.func
 def norm(a: Vec3) -> Real:
-    return root(dot(a, a))
+    return sqrt(dot(a, a))
 
 
 @wp.func
@@ -177,7 +177,7 @@ def conjugate(q: Quat) -> Quat:
 
 @wp.func
 def normalize(q: Quat) -> Quat:
-    k = fill(1.0) / root(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
+    k = fill(1.0) / sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w)
     return Quat(k * q.x, k * q.y, k * q.z, k * q.w)
 
 
@@ -221,16 +221,16 @@ def exponential(a: Vec3) -> Quat:
     """Quaternion of a rotation vector [rad]."""
     angle = norm(a)
     h = sin_cos(0.5 * angle)
-    k = where_lt(angle, fill(1.0e-3), 0.5 - 0.0208333333 * (angle * angle), h.sin / most(angle, fill(1.0e-6)))
+    k = where_lt(angle, fill(1.0e-3), 0.5 - 0.0208333333 * (angle * angle), h.sin / max(angle, fill(1.0e-6)))
     return Quat(k * a.x, k * a.y, k * a.z, h.cos)
 
 
 @wp.func
 def logarithm(q: Quat) -> Vec3:
     """Rotation vector [rad] of the shorter of the two rotations that a unit quaternion stands for."""
-    s = root(q.x * q.x + q.y * q.y + q.z * q.z)
-    c = size(q.w)
-    k = where_lt(s, fill(1.0e-4), fill(2.0), 2.0 * arc_tangent(s, c) / most(s, fill(1.0e-6)))
+    s = sqrt(q.x * q.x + q.y * q.y + q.z * q.z)
+    c = abs(q.w)
+    k = where_lt(s, fill(1.0e-4), fill(2.0), 2.0 * arc_tangent(s, c) / max(s, fill(1.0e-6)))
     k = where_lt(q.w, fill(0.0), neg(k), k)
     return Vec3(k * q.x, k * q.y, k * q.z)
 
