@@ -1,27 +1,28 @@
-# make setup | demo | test | test-all | bench | lint | wheel | clean
-# With learning (torch):  make setup EXTRAS=dev,learn
+# make setup | demo | test | test-all | bench | lint | types | wheel | clean
+# EXTRAS: what is set up beside the client's own needs. The demo sets up none where nothing is set up yet.
 
 PYTHON ?= python3
 VENV   ?= .venv
-EXTRAS ?= dev
+EXTRAS ?= dev,learn
 PY     := $(VENV)/bin/python
-STAMP  := $(VENV)/.stamp-$(EXTRAS)
-WHAT   := -q -c constraints.txt -e '.[$(EXTRAS)]'
+BARE   := $(VENV)/.stamp-
+STAMP  := $(BARE)$(EXTRAS)
+WHAT    = -q -c constraints.txt -e '.$(patsubst %,[%],$(@:$(BARE)%=%))'
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all bench lint wheel clean
+.PHONY: setup demo test test-all bench lint types wheel clean
 
 setup: $(STAMP)
 
 # uv where there is one; pip where there is none, or where uv does not find a package.
-$(STAMP): pyproject.toml constraints.txt
+$(sort $(STAMP) $(BARE)): pyproject.toml constraints.txt
 	@echo "setting up $(VENV): about a minute the first time"
 	@$(PYTHON) -m venv $(VENV)
 	@if command -v uv >/dev/null && uv pip install --python $(PY) $(WHAT); then :; \
 	 else $(PY) -m pip install --disable-pip-version-check $(WHAT); fi
 	@touch $@
 
-demo: $(STAMP)
+demo: $(or $(wildcard $(STAMP)),$(BARE))
 	$(PY) -m warpdribble demo
 
 test: $(STAMP)
@@ -35,10 +36,18 @@ bench: $(STAMP)
 
 lint: $(STAMP)
 	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+
+# A checker follows no __path__: it sees the packages as links in one folder.
+INSIDE := $(filter-out %__pycache__ warpdribble,$(wildcard warpdribble/*) $(patsubst %/__init__.py,%,$(wildcard */__init__.py)))
+types: $(STAMP)
+	@mkdir -p .typing/warpdribble && find -L .typing -type l -delete
+	@ln -sfn $(addprefix ../../,$(INSIDE)) .typing/warpdribble
+	$(PY) -m mypy
 
 wheel: $(STAMP)
 	$(PY) -m build
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .typing .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

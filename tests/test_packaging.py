@@ -27,7 +27,7 @@ PACKAGES = {
 """Import name -> folder of every package there is."""
 NOT_SOURCE = shutil.ignore_patterns(
     ".git", ".venv*", "venv*", "build", "dist", "out", "*.egg-info", "__pycache__", ".*_cache",
-    ".hypothesis", "shared",
+    ".typing", ".hypothesis", "shared",
 )  # fmt: skip
 
 IMPORT_ALL = f"""
@@ -97,6 +97,7 @@ def test_wheel_imports(tmp_path, via_sdist):
         with tarfile.open(build("sdist", tree, tmp_path)) as sdist:
             sdist.extractall(tmp_path / "sdist", filter="data")
         (tree,) = (tmp_path / "sdist").iterdir()
+        assert (tree / "warpdribble" / "py.typed").is_file()
     compileall.compile_dir(tree / "assets", quiet=1)  # must not end in the wheel
     wheel = build("wheel", tree, tmp_path)
 
@@ -107,6 +108,7 @@ def test_wheel_imports(tmp_path, via_sdist):
         files = [f.relative_to(ROOT) for f in (ROOT / folder).rglob(pattern) if f.is_file()]
         expected = {prefix + f.as_posix() for f in files if "__pycache__" not in f.parts}
         assert expected <= names, expected - names
+    assert "warpdribble/py.typed" in names
     assert not [n for n in names if "__pycache__" in n or n.startswith(("tests", "kernels"))]
 
     env_python = make_env(tmp_path / "env")
@@ -137,6 +139,20 @@ def test_pyproject_lists_what_exists():
     setuptools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
     assert sorted(setuptools["packages"]) == sorted(PACKAGES)
     assert sorted(setuptools["package-dir"].values()) == sorted(TOP)
+
+
+def test_hook_runs_what_ci_runs():
+    """What the pre-commit hook installs for itself is pinned to what the dev extra pins."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    wanted = (line.partition(";")[0].strip() for line in extras["dev"])
+    pinned = dict(line.split("==") for line in wanted if "==" in line)
+    assert {"mypy", "ruff"} <= set(pinned)
+    hook = (ROOT / ".pre-commit-config.yaml").read_text()
+    lists = re.findall(r"additional_dependencies: \[(.*)\]", hook)
+    assert lists and hook.count("additional_dependencies") == len(lists)
+    for package in (name.strip() for several in lists for name in several.split(",")):
+        name, _, version = package.partition("==")
+        assert pinned.get(name) == version, package
 
 
 def test_public_names_are_no_modules():
