@@ -351,16 +351,19 @@ def mjcf() -> str:
     add(element, "geom", name="ball", type="sphere", size=BALL_RADIUS, contype=1,
         rgba="0.90 0.45 0.13 1", user="0.8 0.2 1e-5")  # fmt: skip
 
-    # who may touch what: a fall is the ground on anything but the feet, a bad contact the ball on
-    # anything but the hands
+    # who is what, left before right; and who may touch what: a fall is the ground on anything but the feet,
+    # a bad contact the ball on anything but the hands
     custom = add(root, "custom")
     for role, parts in {
         "feet": ("foot", "toes"),
         "hands": ("hand", *(f"{finger}_{n}" for finger in FINGERS for n in (1, 2, 3))),
+        "palms": ("palm",),
+        "knuckles": ("index_1", "middle_1", "pinky_1"),
     }.items():
         names = [f"{side}_{part}" for side in "lr" for part in parts]
         add(custom, "text", name=role, data=" ".join(names))
-    add(custom, "text", name="ball", data="ball")
+    for role, name in {"ball": "ball", "trunk": "torso", "head": "head"}.items():
+        add(custom, "text", name=role, data=name)
 
     keyframe, upright = add(root, "keyframe"), vec(1, 0, 0, 0)
     for name, (grip, pose) in KEYFRAMES.items():

@@ -7,13 +7,15 @@ from ...lazy import lazily
 if TYPE_CHECKING:
     from .mjcf import ModelError, Shape
     from .model import Model
+    from .roles import Roles
 
-__all__ = ["Model", "ModelError", "Shape"]
+__all__ = ["Model", "ModelError", "Roles", "Shape"]
 
 __getattr__, __dir__ = lazily(
     __name__,
     {
         ".mjcf": "ModelError Shape",
         ".model": "Model",
+        ".roles": "Roles",
     },
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from .mjcf import (
     read_shapes,
     xyzw,
 )
+from .roles import Roles, find_roles
 from .slots import build_slots
 
 JOINT_TYPES = ("free", "ball", "hinge")
@@ -54,13 +56,15 @@ class Model:
     """(nbody, 3, 3) about the centre of mass, body axes [kg m^2]"""
     joint_names: list[str]
     joint_link: np.ndarray
+    joint_child: np.ndarray
+    """(njoint,) index of the body that each joint moves against its parent"""
     shapes: list[Shape]
     sites: dict[str, tuple[int, np.ndarray, np.ndarray]]
     """site name -> (body, position (3,) [m], quaternion xyzw (4,)) in the body's frame"""
     keyframes: dict[str, np.ndarray]
     """joint_q (nq,) by name"""
     texts: dict[str, str]
-    """<custom><text> elements of the file: lists of body names that mean something to its user"""
+    """<custom><text> elements of the file: lists of names that mean something to its user, see `roles`"""
     start_q: np.ndarray
     """(nq,) the keyframe `start`, or the file's zero pose"""
     tables: dict[str, np.ndarray]
@@ -122,6 +126,18 @@ class Model:
         """(3,) unit axis of a hinge in its body's frame."""
         return self.tables["link_axis"][self.joint_link[self.joint(name)]].copy()
 
+    def joint_body(self, name: str) -> int:
+        """Index of the body that a joint moves against its parent."""
+        return int(self.joint_child[self.joint(name)])
+
+    def body_joint(self, body: int) -> str:
+        """The one joint that moves a body against its parent. Raises ValueError when there are none or
+        several."""
+        joints = np.flatnonzero(self.joint_child == body)
+        if len(joints) != 1:
+            raise ValueError(f"body '{self.body_names[body]}' has {len(joints)} joints, not one")
+        return self.joint_names[joints[0]]
+
     def q_slice(self, name: str) -> slice:
         """Where a joint's coordinates are in joint_q."""
         link = self.joint_link[self.joint(name)]
@@ -137,6 +153,11 @@ class Model:
     def named_bodies(self, text: str) -> set[int]:
         """Bodies that the file lists under <custom><text name=...>; empty where it does not."""
         return {self.body(name) for name in self.texts.get(text, "").split()}
+
+    @cached_property
+    def roles(self) -> Roles:
+        """Which bodies and joints play which part: root, hands, feet, ball ..."""
+        return find_roles(self)
 
     def quaternions(self) -> list[int]:
         """Where quaternions start in joint_q."""
@@ -200,6 +221,7 @@ def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without:
         body_inertia=_inertia_matrices(m),
         joint_names=[m.joint(j).name or f"joint{j}" for j in range(m.njnt)],
         joint_link=np.arange(1, m.njnt + 1),
+        joint_child=m.jnt_bodyid - 1,
         shapes=shapes,
         sites={
             m.site(s).name: (
