@@ -6,8 +6,13 @@
 Importing this package loads nothing heavy; the public names load theirs on first use.
 """
 
-from importlib import import_module as _import_module
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING
+
+from .lazy import lazily
+
+if TYPE_CHECKING:
+    from .sims import Model, Simulation
 
 __version__ = "0.1.0"
 
@@ -17,15 +22,6 @@ _beside = (_here.parent / "kernels" / "__init__.py").is_file()
 if __name__ == "warpdribble" and _beside and not (_here / "kernels").is_dir():
     __path__.append(str(_here.parent))
 
-_public = {"Model": ".sims", "Simulation": ".sims"}
 __all__ = ["Model", "Simulation", "__version__"]
 
-
-def __getattr__(name):
-    if name in _public:
-        return getattr(_import_module(_public[name], __name__), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__():
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazily(__name__, {".sims": "Model Simulation"})

@@ -11,17 +11,15 @@ import os
 import sys
 from functools import reduce
 from operator import or_
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
-from .commands import COMMANDS
+from .commands import COMMANDS, Command
 
 ABOUT = "Recorded motion becomes a simulated basketball player. Also: warpdribble bench."
-CHOICES = OmitSubcommandPrefixes[
-    reduce(or_, (Annotated[command, subcommand(name)] for name, command in COMMANDS.items()))
-]
+CHOICES: Any = reduce(or_, (Annotated[command, subcommand(name)] for name, command in COMMANDS.items()))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -43,15 +41,15 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
 
 
-def _parse(arguments: list[str]):
+def _parse(arguments: list[str]) -> Command:
     """The command asked for; a mistake becomes one line. Raises SystemExit."""
     if {"-h", "--help"} & set(arguments):
-        return tyro.cli(CHOICES, args=arguments, prog="warpdribble", description=ABOUT)
+        return _command(arguments)
     box, width = io.StringIO(), os.environ.get("COLUMNS")
     os.environ["COLUMNS"] = "400"
     try:
         with contextlib.redirect_stderr(box):
-            return tyro.cli(CHOICES, args=arguments, prog="warpdribble", description=ABOUT)
+            return _command(arguments)
     except SystemExit:
         _complain(_first_sentence(box.getvalue()) + " (see warpdribble --help)")
         raise
@@ -59,6 +57,11 @@ def _parse(arguments: list[str]):
         del os.environ["COLUMNS"]
         if width is not None:
             os.environ["COLUMNS"] = width
+
+
+def _command(arguments: list[str]) -> Command:
+    short = (OmitSubcommandPrefixes,)
+    return tyro.cli(CHOICES, args=arguments, prog="warpdribble", description=ABOUT, config=short)
 
 
 def _first_sentence(box: str) -> str:

@@ -34,7 +34,9 @@ for _short, _side in (("l", "Left"), ("r", "Right")):
 """CMU's bones -> the joints of their BVH conversion, so that both are one skeleton to all that follows."""
 
 
-def read_amc(path: str | Path, units=None, up=None, asf=None) -> tuple[Motion, list[str]]:
+def read_amc(
+    path: str | Path, units: str | float | None = None, up: str | None = None, asf: str | Path | None = None
+) -> tuple[Motion, list[str]]:
     """Read an AMC file as a Motion in metres, Z up, and notes.
 
     asf: the skeleton; without it the one ASF file of the same name, of the part before `_`, or alone in
@@ -71,7 +73,7 @@ def _skeleton_beside(path: Path) -> Path:
     raise ClipError(path, f"needs its skeleton, {path.stem.partition('_')[0]}.asf, beside it; {has}")
 
 
-def _frames(path: Path, lines, skeleton: Skeleton) -> tuple[dict[str, np.ndarray], bool]:
+def _frames(path: Path, lines: list[list[str]], skeleton: Skeleton) -> tuple[dict[str, np.ndarray], bool]:
     """Channels (frames, dof) of every bone that has any, and whether angles are degrees."""
     degrees = skeleton.degrees
     rows: dict[str, list[list[float]]] = {n: [] for n, b in skeleton.bones.items() if b.dof}
@@ -101,13 +103,13 @@ def _frames(path: Path, lines, skeleton: Skeleton) -> tuple[dict[str, np.ndarray
     return numbers, degrees
 
 
-def _check_complete(path: Path, rows, frame: int) -> None:
+def _check_complete(path: Path, rows: dict[str, list[list[float]]], frame: int) -> None:
     short = [name for name, values in rows.items() if len(values) < frame]
     if short:
         raise ClipError(path, f"broken AMC: frame {frame} lacks {', '.join(short[:3])}")
 
 
-def _motion(path: Path, skeleton: Skeleton, numbers, degrees: bool) -> Motion:
+def _motion(path: Path, skeleton: Skeleton, numbers: dict[str, np.ndarray], degrees: bool) -> Motion:
     """The motion in the file's units and axes: a joint where each bone begins, an end where a chain ends."""
     bones = list(skeleton.bones.values())
     numbering = {bone.name: i for i, bone in enumerate(bones)}

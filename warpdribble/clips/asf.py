@@ -35,7 +35,8 @@ class Bone:
     """Frame its angles are about, in the zero pose (C of the format's descriptions)."""
     dof: tuple[str, ...] = ()
     """Channels in the order of the AMC file's numbers."""
-    parent: str | None = None
+    parent: str = ""
+    """Empty for the root."""
 
 
 @dataclass

@@ -26,6 +26,7 @@ LARGEST = 2**28
 FAR = 1e3
 """[m] No joint and no ball is farther from the origin."""
 
+Offset = tuple[float, float, float]
 LEG = {"Hip": ("Pelvis", (0.1097, -0.0366, 0.0)), "Knee": ("Hip", (0.0, -0.4612, 0.0256))}
 LEG |= {"Ankle": ("Knee", (0.0, -0.3644, -0.0256)), "Toe": ("Ankle", (0.0, -0.0986, 0.1566))}
 TRUNK = {"Torso": ("Pelvis", (0.0, 0.0878, -0.0280)), "Spine": ("Torso", (0.0, 0.1061, 0.0))}
@@ -39,11 +40,11 @@ TO_MOTION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rest frame X left, Y up, Z forward -> X forward, Y left, Z up."""
 
 
-def _skeleton() -> dict[str, tuple[str | None, tuple | None]]:
+def _skeleton() -> dict[str, tuple[str | None, Offset | None]]:
     """name -> (parent, offset [m]) in body order; fingers have no published offset: None."""
-    bones = {"Pelvis": (None, (0.0, 0.0, 0.0))}
+    bones: dict[str, tuple[str | None, Offset | None]] = {"Pelvis": (None, (0.0, 0.0, 0.0))}
 
-    def add(part, side, sign):
+    def add(part: dict[str, tuple[str, Offset]], side: str, sign: float) -> None:
         for name, (parent, (x, y, z)) in part.items():
             parent = f"{side}_{parent}" if parent in part else parent
             bones[f"{side}_{name}"] = (parent, (sign * x, y, z))

@@ -25,7 +25,9 @@ CMU_WRISTS = {
 CMU_THORAX = ("Neck", "LeftShoulder", "RightShoulder")
 
 
-def read_bvh(path: str | Path, units=None, up=None) -> tuple[Motion, list[str]]:
+def read_bvh(
+    path: str | Path, units: str | float | None = None, up: str | None = None
+) -> tuple[Motion, list[str]]:
     """Read a BVH file as a Motion in metres, Z up, and notes on what was detected or repaired.
 
     units, up: as in `clips.read_clip`. Frames count from 0; where the file begins with an added T-pose
@@ -80,7 +82,7 @@ def repair_cmu_offsets(names: list[str], offsets: np.ndarray) -> list[str]:
     is half the radius (exact in the skeletons compared), the thorax continues the spine (within 3.5
     mm).
     """
-    lost = {}
+    lost: dict[str, np.ndarray] = {}
     for hand, fingers in CMU_WRISTS.items():
         lost |= {f: 0.5 * offsets[names.index(hand)] for f in fingers if {f, hand} <= set(names)}
     lower, upper = (offsets[names.index(n)] for n in ("Spine", "Spine1"))

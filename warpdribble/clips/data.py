@@ -154,6 +154,6 @@ def _bring(entry: Entry, target: Path, source: str | None) -> Path:
     return target
 
 
-def _copy(url, output_file, pooch) -> None:
+def _copy(url: str, output_file: str, pooch: object) -> None:
     """A pooch downloader for files of this machine."""
     shutil.copyfile(url, output_file)

@@ -40,14 +40,21 @@ def read_clip(
     raise ClipError(path, f"clips are {', '.join(SUFFIXES)}, not '{path.suffix or path.name}'")
 
 
-def read_part(path: str | Path, frames=(0, -1), repairs: str = "", **reading) -> tuple[Motion, list[str]]:
+def read_part(
+    path: str | Path,
+    frames: tuple[int, int] = (0, -1),
+    repairs: str = "",
+    units: str | float | None = None,
+    up: str | None = None,
+    asf: str | Path | None = None,
+) -> tuple[Motion, list[str]]:
     """A part of a clip, repaired, and notes.
 
     frames: (first, last), both included; a last of -1 is the clip's. repairs: some of spikes, toes, lowpass,
-    ground, joined by commas, or "all"; they are made on the whole clip. reading: as in `read_clip`. Raises
-    ClipError and ValueError.
+    ground, joined by commas, or "all"; they are made on the whole clip. units, up, asf: as in `read_clip`.
+    Raises ClipError and ValueError.
     """
-    motion, notes = read_clip(path, **reading)
+    motion, notes = read_clip(path, units, up, asf)
     first, last = frames
     last = motion.frame_count - 1 if last == -1 else last
     if not 0 <= first < last < motion.frame_count:

@@ -36,7 +36,13 @@ def check_numbers(path: Path, **values: np.ndarray) -> None:
             raise ClipError(path, f"the {name} hold the value {array.flat[np.abs(array).argmax()]:.3g}")
 
 
-def into_room(path: Path, motion: Motion, units, up, special=None) -> tuple[Motion, list[str]]:
+def into_room(
+    path: Path,
+    motion: Motion,
+    units: str | float | None,
+    up: str | None,
+    special: tuple[float, str] | None = None,
+) -> tuple[Motion, list[str]]:
     """A motion as its file has it, brought to metres and Z up, rest pose facing +X; and notes.
 
     units: a name of UNITS, metres per unit, or None; up: "x", "y", "z" or None. special: (metres per
@@ -62,7 +68,9 @@ def change_basis(quaternions: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return np.concatenate([quaternions[..., :3] @ turn.T, quaternions[..., 3:]], axis=-1)
 
 
-def _unit(path, motion: Motion, units, special) -> tuple[float, str]:
+def _unit(
+    path: Path, motion: Motion, units: str | float | None, special: tuple[float, str] | None
+) -> tuple[float, str]:
     """Metres per length unit, and how it was told."""
     if units is not None:
         scale = metres(units)
@@ -98,7 +106,7 @@ def metres(units: str | float) -> float:
     return scale
 
 
-def _up(path, motion: Motion, up) -> tuple[str, str]:
+def _up(path: Path, motion: Motion, up: str | None) -> tuple[str, str]:
     """The axis that points up, and how it was told: from the feet to the head over the clip."""
     if up is not None:
         if up not in TO_Z_UP:

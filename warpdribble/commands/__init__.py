@@ -4,6 +4,8 @@ A new command is a dataclass with a `run() -> int` (the exit status) and a line 
 wrong with the input is raised as ValueError or OSError, its message one line that says what to do.
 """
 
+from typing import Protocol
+
 from .evaluate import Evaluate
 from .export import Export
 from .fetch import Fetch
@@ -12,7 +14,15 @@ from .motion import MotionGroup
 from .simulate import Demo, Simulate
 from .skill import SkillGroup
 
-COMMANDS = {
+
+class Command(Protocol):
+    """What a command line is parsed into."""
+
+    def run(self) -> int:
+        """Do it; the exit status. Raises ValueError, OSError, FloatingPointError."""
+
+
+COMMANDS: dict[str, type[Command]] = {
     "simulate": Simulate,
     "demo": Demo,
     "motion": MotionGroup,
@@ -23,4 +33,4 @@ COMMANDS = {
     "export": Export,
 }
 
-__all__ = ["COMMANDS"]
+__all__ = ["COMMANDS", "Command"]

@@ -6,6 +6,18 @@ import contextlib
 import math
 import re
 import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from ..learning.tasks.locomotion import Locomotion
+    from ..sims import Model, Simulation
+
+
+class Progress(Protocol):
+    """What a long job calls with the steps done, and a note to show."""
+
+    def __call__(self, done: int, note: str = "") -> None: ...
 
 
 def say(line: str) -> None:
@@ -14,7 +26,7 @@ def say(line: str) -> None:
 
 
 @contextlib.contextmanager
-def compiling():
+def compiling() -> Iterator[None]:
     """Show, on stderr, that kernels are compiled meanwhile."""
     from rich.console import Console
 
@@ -26,7 +38,7 @@ def compiling():
         yield
 
 
-def ready(model, worlds: int, device: str):
+def ready(model: Model, worlds: int, device: str) -> Simulation:
     """A simulation that has compiled what it needs; the wait is shown."""
     from ..sims import Simulation
 
@@ -37,7 +49,7 @@ def ready(model, worlds: int, device: str):
     return sim
 
 
-def warmed(task):
+def warmed(task: Locomotion) -> Locomotion:
     """A learning task that has compiled what it needs."""
     import numpy as np
 
@@ -49,15 +61,15 @@ def warmed(task):
 
 
 @contextlib.contextmanager
-def bar(label: str, total: int):
+def bar(label: str, total: int) -> Iterator[Progress]:
     """Progress of a long job on stderr: yields what to call with the steps done, and a note to show."""
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as Bars
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda done, note="": bar.update(task, completed=done, description=f"{label}{note}")
+    with Bars(console=console, transient=True, disable=not console.is_terminal) as bars:
+        task = bars.add_task(label, total=total)
+        yield lambda done, note="": bars.update(task, completed=done, description=f"{label}{note}")
 
 
 def quiet_warp() -> None:
@@ -88,7 +100,7 @@ def check_range(option: str, value: float, least: float, most: float) -> None:
         raise ValueError(f"{option} {value:g}: give a number from {least:g} to {most:g}")
 
 
-def without_nan(value):
+def without_nan(value: Any) -> Any:
     """For JSON, which has no NaN: null in its place, all the way down."""
     if isinstance(value, dict):
         return {key: without_nan(v) for key, v in value.items()}

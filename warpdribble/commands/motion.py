@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import subcommand
 
 from .clip_input import ClipInput
 from .console import say, without_nan
 from .retarget import Cycles, Retarget
+
+if TYPE_CHECKING:
+    from ..sims.recording.defects import Event
+    from ..sims.recording.quality import Quality
 
 MOST = 12
 """Events of a kind that a table lists; JSON has them all."""
@@ -77,7 +82,7 @@ class MotionGroup:
         return self.do.run()
 
 
-def _table(command: Info, notes: list[str], quality) -> list[str]:
+def _table(command: Info, notes: list[str], quality: Quality) -> list[str]:
     first = command.frames[0]
     part = f"frames {first} to {first + quality.frames - 1}"
     lines = [f"clip        {command.clip}, {part}, {quality.duration:.2f} s at {quality.rate:.4g} Hz"]
@@ -96,8 +101,10 @@ def _table(command: Info, notes: list[str], quality) -> list[str]:
         slide = f", slides {100.0 * foot.slide:.1f} cm/s: {stances}" if stances else ""
         lines.append(f"{side + ' foot':10}  {len(foot.contacts)} stances{slide}")
     if quality.ball_bounces is not None:
-        held = _list(f"{a}-{b}" for a, b in quality.ball_held) or "never"
-        lines.append(f"ball        bounces at {_list(quality.ball_bounces) or 'no frame'}; in hand {held}")
+        line = f"ball        bounces at {_list(quality.ball_bounces) or 'no frame'}"
+        if quality.ball_held is not None:
+            line += f"; in hand {_list(f'{a}-{b}' for a, b in quality.ball_held) or 'never'}"
+        lines.append(line)
     for what, events, scale, unit in (
         ("jumps", quality.jumps, 1000.0, "mm"),
         ("frozen", quality.frozen, 1.0, "s"),
@@ -110,11 +117,11 @@ def _table(command: Info, notes: list[str], quality) -> list[str]:
     return lines
 
 
-def _list(items) -> str:
-    items = [str(item) for item in items]
-    more = f" and {len(items) - MOST} more" if len(items) > MOST else ""
-    return ", ".join(items[:MOST]) + more
+def _list(items: Iterable[object]) -> str:
+    words = [str(item) for item in items]
+    more = f" and {len(words) - MOST} more" if len(words) > MOST else ""
+    return ", ".join(words[:MOST]) + more
 
 
-def _span(event) -> str:
+def _span(event: Event) -> str:
     return str(event.first) if event.first == event.last else f"{event.first}-{event.last}"

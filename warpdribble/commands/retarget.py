@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .clip_input import ClipInput
 from .console import say
+
+if TYPE_CHECKING:
+    from ..sims import Ball
+    from ..sims.retarget.accuracy import Accuracy
 
 
 @dataclass
@@ -89,7 +94,7 @@ class Cycles(ClipInput):
         return 0
 
 
-def _table(fit) -> list[str]:
+def _table(fit: Accuracy) -> list[str]:
     lines = [f"joints      {100 * fit.mean:.1f} cm from the recording; mean and 95 % by limb:"]
     for limb, (mean, most) in fit.limbs.items():
         lines.append(f"  {limb:10}{100 * mean:5.1f} {100 * most:5.1f} cm")
@@ -102,7 +107,7 @@ def _table(fit) -> list[str]:
     return lines
 
 
-def _ball(name: str, ball, timestep: float) -> list[str]:
+def _ball(name: str, ball: Ball, timestep: float) -> list[str]:
     lines = []
     for hand, parts in ball.contact(timestep).items():
         spans = ", ".join(f"{a:.2f}-{b:.2f}" for a, b in parts[:12])

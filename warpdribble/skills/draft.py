@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..clips.data import data_folder
 from ..clips.read import read_clip
+from ..sims import Model
 from ..sims.ball.ball import inferred_ball, recorded_ball
 from ..sims.retarget.cycles import find_cycles
 from ..sims.retarget.mapping import find_mapping, read_mapping
@@ -18,7 +19,7 @@ GOOD = 0.06
 
 
 def draft(
-    model,
+    model: Model,
     clip: Path,
     frames: tuple[int, int] | None = None,
     name: str = "",

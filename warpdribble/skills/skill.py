@@ -1,7 +1,7 @@
 """Skills: small TOML files that say which part of which clip is learned, and which hand has the ball when.
 
-`skill` reads one by name or path, `play` makes it a reference with its ball. Every mistake in a file is one
-line: file, key, reason.
+`read_skill` reads one by name or path, `stage_skill` makes it a reference with its ball. Every mistake in a
+file is one line: file, key, reason.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import tomllib
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from ..assets import path as asset
 
@@ -20,7 +21,7 @@ CONTACT_KEYS = (*HANDS, "checkpoints", "heights")
 class SkillError(ValueError):
     """A skill that cannot be used; the message is one line with the file, the key and the reason."""
 
-    def __init__(self, source: str | Path, key: str, reason: str):
+    def __init__(self, source: str | Path, key: str, reason: str) -> None:
         super().__init__(f"{source}: {key}: {reason}" if key else f"{source}: {reason}")
         self.source, self.key, self.reason = str(source), key, reason
 
@@ -93,7 +94,7 @@ def parse_skill(text: str, source: str) -> Skill:
     for key in data:
         if key not in known:
             raise SkillError(source, key, f"unknown key; there are {', '.join(sorted(known))}")
-    out: dict = {"source": source}
+    out: dict[str, Any] = {"source": source}
     for key, value in data.items():
         if key == "frames":
             good = isinstance(value, list) and len(value) == 2 and all(type(v) is int for v in value)
@@ -116,9 +117,9 @@ def parse_skill(text: str, source: str) -> Skill:
     return Skill(**out)
 
 
-def _contact(source: str, table) -> dict:
+def _contact(source: str, table: Any) -> dict[str, Any]:
     _expect(isinstance(table, dict), source, "contact", "should be a table")
-    out: dict = {"contact": {}}
+    out: dict[str, Any] = {"contact": {}}
     for key, value in table.items():
         place = f"contact.{key}"
         _expect(key in CONTACT_KEYS, source, place, f"unknown key; there are {', '.join(CONTACT_KEYS)}")
@@ -136,14 +137,14 @@ def _contact(source: str, table) -> dict:
     return out
 
 
-def _span(source: str, place: str, span) -> tuple[float, float]:
+def _span(source: str, place: str, span: Any) -> tuple[float, float]:
     _expect(isinstance(span, list) and len(span) == 2, source, place, "should be [from, to] in seconds")
     start, end = (_number(source, place, v) for v in span)
     _expect(start < end, source, place, f"{start} to {end} s is no range")
     return start, end
 
 
-def _number(source: str, place: str, value) -> float:
+def _number(source: str, place: str, value: Any) -> float:
     number = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value < 1e4
     _expect(number, source, place, "should be a number from 0")
     return float(value)
