@@ -8,13 +8,20 @@ is seen touches where the simulation touches; the rest was shaped by eye.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..assets import path as asset
+from ..sims.model import Model, Shape
 
 SKIN, HAIR, JERSEY, SHORTS, SOCK, SHOE, SOLE = "skin", "hair", "jersey", "shorts", "sock", "shoe", "sole"
+Vector = tuple[float, float, float]
+Plane = tuple[Vector, float]
+"""normal, offset [m]"""
+Border = tuple[str, Vector, float]
+"""region, normal, offset [m]"""
 
 
 @dataclass(frozen=True)
@@ -27,21 +34,21 @@ class Lump:
 
     body: str
     region: str
-    p: tuple
-    q: tuple
-    r: tuple
+    p: Vector
+    q: Vector
+    r: tuple[float, float]
     blend: float = 0.012
     """[m] how far the surface flows into its neighbours'."""
-    scale: tuple = (1.0, 1.0, 1.0)
-    cut: tuple | None = None
-    paint: tuple = ()
+    scale: Vector = (1.0, 1.0, 1.0)
+    cut: Plane | None = None
+    paint: tuple[Border, ...] = ()
     fold: bool = False
     """Whether `paint` goes by |y|: for lumps in the middle."""
 
     def mirrored(self) -> Lump:
         """The same on the other side of the body."""
 
-        def flip(v):
+        def flip(v: Vector) -> Vector:
             return (v[0], -v[1], v[2])
 
         name = "r" + self.body[1:] if self.body.startswith("l_") else self.body
@@ -55,11 +62,11 @@ class Lump:
         )
 
 
-def cone(body, region, p, q, rp, rq, **more) -> Lump:
+def cone(body: str, region: str, p: Vector, q: Vector, rp: float, rq: float, **more: Any) -> Lump:
     return Lump(body, region, p, q, (rp, rq), **more)
 
 
-def blob(body, region, centre, radii, **more) -> Lump:
+def blob(body: str, region: str, centre: Vector, radii: Vector, **more: Any) -> Lump:
     """An ellipsoid."""
     return Lump(body, region, centre, centre, (1.0, 1.0), scale=radii, **more)
 
@@ -71,13 +78,13 @@ TOE_RUBBER = ((SOLE, (0.0, 0.0, -1.0), 0.004),)
 HAIRLINE = ((HAIR, (-0.549, 0.0, 0.836), 0.108),)
 
 
-def _plane(region, normal, offset, origin) -> tuple:
+def _plane(region: str, normal: Vector, offset: float, origin: Vector) -> Border:
     """A border that is written in the torso's axes, in those of a body that stands at `origin` of the
     torso."""
     return (region, normal, offset - float(np.dot(normal, origin)))
 
 
-def _shirt(x: float, y: float, z: float) -> tuple:
+def _shirt(x: float, y: float, z: float) -> tuple[Border, Border]:
     """Neckline and armhole of a jersey, for a body at (x, y, z) of the torso; the same planes for all."""
     at = (x, y, z)
     return _plane(SKIN, (0.45, -0.35, 0.85), 0.153, at), _plane(SKIN, (0.0, 0.8, 0.6), 0.21, at)
@@ -154,7 +161,7 @@ SIDE = [
 PLAYER = [*MIDDLE, *SIDE, *(lump.mirrored() for lump in SIDE)]
 
 
-def of(model) -> list[Lump]:
+def of(model: Model) -> list[Lump]:
     """The primitives of a model: the player's, and for every other body its own shapes."""
     drawn = [lump for lump in PLAYER if lump.body in model.body_names] if _is_player(model) else []
     covered = {lump.body for lump in drawn}
@@ -166,9 +173,9 @@ def of(model) -> list[Lump]:
     return drawn
 
 
-def colours(model) -> dict[str, tuple]:
+def colours(model: Model) -> dict[str, Vector]:
     """Colour of each region, as far as it can be told from the model's own."""
-    named = {s.name: tuple(float(c) for c in s.rgba[:3]) for s in model.shapes}
+    named = {s.name: _vector(s.rgba[:3]) for s in model.shapes}
     own = {f"shape {name}": colour for name, colour in named.items()}
     return own | {
         SKIN: named.get("l_hand", (0.80, 0.60, 0.47)),
@@ -181,38 +188,43 @@ def colours(model) -> dict[str, tuple]:
     }
 
 
-def ball_bodies(model) -> set[int]:
+def ball_bodies(model: Model) -> set[int]:
     """Bodies that are no part of a player."""
     return model.named_bodies("ball") | {b for b, name in enumerate(model.body_names) if name == "ball"}
 
 
-def _is_player(model) -> bool:
+def _is_player(model: Model) -> bool:
     """Whether it is the model that the primitives were shaped for; another of the same names has other
     sizes."""
     return model.path.resolve() == asset("player.xml").resolve()
 
 
-def _of_shape(name: str, shape) -> Lump:
+def _of_shape(name: str, shape: Shape) -> Lump:
     axis = Rotation.from_quat(shape.quat).apply([0.0, 0.0, 1.0])
     if shape.kind == "box":
         half = np.asarray(shape.size[:3], float)
         radii = Rotation.from_quat(shape.quat).apply(half * 1.25)
-        return blob(name, _region(name, shape), tuple(shape.pos), tuple(np.abs(radii)), blend=0.004)
+        return blob(name, _region(name, shape), _vector(shape.pos), _vector(np.abs(radii)), blend=0.004)
     reach = float(shape.size[1]) if shape.kind == "capsule" else 0.0
     radius = float(shape.size[0])
     blend = min(0.012, 0.35 * radius)
     return cone(
         name,
         _region(name, shape),
-        tuple(shape.pos - reach * axis),
-        tuple(shape.pos + reach * axis),
+        _vector(shape.pos - reach * axis),
+        _vector(shape.pos + reach * axis),
         radius,
         0.9 * radius,
         blend=blend,
     )
 
 
-def _region(name: str, shape) -> str:
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _region(name: str, shape: Shape) -> str:
     return (
         SKIN
         if name[2:].partition("_")[0] in ("thumb", "index", "middle", "ring", "pinky")

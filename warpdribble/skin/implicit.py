@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .flesh import Lump
+
 OUTSIDE = -12.0
 """F where no primitive is near."""
 FAR = 1.0
@@ -16,9 +18,9 @@ FAR = 1.0
 
 
 class Union:
-    """Primitives placed in space. lumps: as `flesh.Lump`; frames: (nbody, 7), body frames by index."""
+    """Primitives placed in space. body_of: a body's name -> its index; frames: (nbody, 7), by index."""
 
-    def __init__(self, lumps, body_of: dict[str, int], frames: np.ndarray):
+    def __init__(self, lumps: list[Lump], body_of: dict[str, int], frames: np.ndarray) -> None:
         self.lumps = lumps
         self.bodies = np.array([body_of[lump.body] for lump in lumps])
         self.origins = frames[self.bodies, :3]
@@ -58,14 +60,18 @@ class Union:
             total[who] += np.exp(np.minimum(-d / self.lumps[i].blend, 60.0))
         return np.log(total)
 
-    def slope(self, points: np.ndarray, near=None, step: float = 2e-4) -> tuple[np.ndarray, np.ndarray]:
+    def slope(
+        self, points: np.ndarray, near: list[np.ndarray] | None = None, step: float = 2e-4
+    ) -> tuple[np.ndarray, np.ndarray]:
         """F (points,) and its gradient (points, 3) [1/m], by differences."""
         near = self.near(points) if near is None else near
         here = self.values(points, near)
         ahead = [self.values(points + step * e, near) for e in np.eye(3)]
         return here, (np.stack(ahead, axis=1) - here[:, None]) / step
 
-    def project(self, points: np.ndarray, rounds: int, most: float = 0.01, near=None) -> np.ndarray:
+    def project(
+        self, points: np.ndarray, rounds: int, most: float = 0.01, near: list[np.ndarray] | None = None
+    ) -> np.ndarray:
         """Points moved onto the surface along the gradient (Newton), at most `most` [m] a round."""
         near = self.near(points) if near is None else near
         for _ in range(rounds):
@@ -93,7 +99,7 @@ class Union:
         return np.log(np.maximum(total, np.exp(OUTSIDE)))
 
 
-def distance(lump, x: np.ndarray) -> np.ndarray:
+def distance(lump: Lump, x: np.ndarray) -> np.ndarray:
     """(points,) [m] to a primitive from points (points, 3) in its body's axes; near the surface to first
     order."""
     scale, p, q = np.asarray(lump.scale), np.asarray(lump.p), np.asarray(lump.q)

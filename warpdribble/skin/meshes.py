@@ -10,6 +10,8 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from ..sims.model import Shape
+
 BOX_ROUNDING = 0.35
 """Radius of a box's edges, as a share of its smallest half size."""
 SEAM_HALF_WIDTH = 0.035
@@ -26,12 +28,8 @@ class Mesh:
     """(faces, 3) int, counter-clockwise seen from outside."""
 
 
-def shape_mesh(shape) -> Mesh:
-    """The surface of a sphere, capsule or box in the frame of its body.
-
-    shape: an object with kind, size, pos and quat as `sims.Model.shapes` has. Raises ValueError for
-    other kinds.
-    """
+def shape_mesh(shape: Shape) -> Mesh:
+    """The surface of a sphere, capsule or box in the frame of its body. Raises ValueError for other kinds."""
     mesh = _plain(shape.kind, tuple(float(v) for v in shape.size), shape.name)
     turn = Rotation.from_quat(shape.quat)
     return Mesh(turn.apply(mesh.points) + shape.pos, turn.apply(mesh.normals), mesh.faces)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial.transform import Rotation, Slerp
 
-from ..sims.model import pose
+from ..sims.model import Model, pose
 from . import flesh
 from .implicit import Union
 from .meshes import Mesh
@@ -42,7 +42,7 @@ class Skin:
     regions: list[str]
     region: np.ndarray
     """(faces,) int, index into regions"""
-    colours: dict[str, tuple]
+    colours: dict[str, flesh.Vector]
     """by region"""
     bind_q: np.ndarray
     """(nbody, 7) poses of the bodies in the bind pose"""
@@ -60,10 +60,10 @@ class Skin:
         return moved
 
 
-_built: dict[int, tuple[object, Skin]] = {}
+_built: dict[int, tuple[Model, Skin]] = {}
 
 
-def of(model) -> Skin:
+def of(model: Model) -> Skin:
     """The skin of a model; built once, in about two seconds. Raises ValueError where there is nothing to
     cover."""
     if id(model) not in _built:
@@ -71,7 +71,7 @@ def of(model) -> Skin:
     return _built[id(model)][1]
 
 
-def _build(model) -> Skin:
+def _build(model: Model) -> Skin:
     lumps = flesh.of(model)
     if not lumps:
         raise ValueError("the model has no shapes to put a skin on")
@@ -82,7 +82,7 @@ def _build(model) -> Skin:
     points = union.project(points, 1)
     points, border, region, names = _paint(union, points, faces)
     labels = union.bodies[np.argmin(union.distances(points), axis=0)]
-    bodies, weights = _weights(labels, points, faces, model.nbody)
+    bodies, weights = _weights(labels, faces, model.nbody)
 
     draft = Skin(Mesh(points, points, faces), bodies, weights, names, region, {}, zero)
     bound = Union(lumps, body_of, bind)
@@ -95,7 +95,7 @@ def _build(model) -> Skin:
     )
 
 
-def poses(model) -> tuple[np.ndarray, np.ndarray]:
+def poses(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Body poses (nbody, 7) of the zero pose and of the bind pose."""
     zero = np.array(model.start_q, float)
     for name in model.joint_names:
@@ -112,10 +112,11 @@ def poses(model) -> tuple[np.ndarray, np.ndarray]:
             q = model.q_slice(name)
             ends = Rotation.from_quat([zero[q], model.start_q[q]])
             bind[q] = Slerp([0.0, 1.0], ends)(LOWERED).as_quat()
-    return pose.forward(model, np.stack([zero, bind]))
+    at_zero, at_bind = pose.forward(model, np.stack([zero, bind]))
+    return at_zero, at_bind
 
 
-def _surface(union: Union, body_of, zero) -> tuple[np.ndarray, np.ndarray]:
+def _surface(union: Union, body_of: dict[str, int], zero: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The surface in the zero pose: trunk and limbs on one grid, each hand on a finer one, sewn at the
     wrist."""
     ends = [
@@ -137,7 +138,7 @@ def _surface(union: Union, body_of, zero) -> tuple[np.ndarray, np.ndarray]:
         axes[2] = np.concatenate([line(low[2], chin, CELL), line(chin, high[2], 0.0068)[1:]])
     points, faces = surface_net(union.on_grid(axes), axes)
     for side, centre in hands.items():
-        reach = [wrist, high[1]] if side == "l" else [low[1], -wrist]
+        reach = (wrist, high[1]) if side == "l" else (low[1], -wrist)
         around = [centre[[0, 2]] - [0.08, 0.075], centre[[0, 2]] + [0.13, 0.075]]
         grid = [
             line(around[0][0], around[1][0], HAND_CELL),
@@ -149,7 +150,7 @@ def _surface(union: Union, body_of, zero) -> tuple[np.ndarray, np.ndarray]:
     return points, faces
 
 
-def _weights(labels, points, faces, nbody) -> tuple[np.ndarray, np.ndarray]:
+def _weights(labels: np.ndarray, faces: np.ndarray, nbody: int) -> tuple[np.ndarray, np.ndarray]:
     """Bodies and weights (points, INFLUENCES) from the label of each point, diffused."""
     count = len(labels)
     weights = coo_matrix(
@@ -164,7 +165,7 @@ def _weights(labels, points, faces, nbody) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum(order, nbody - 1), kept / kept.sum(axis=1, keepdims=True)
 
 
-def _settle(union: Union, points, faces, border) -> np.ndarray:
+def _settle(union: Union, points: np.ndarray, faces: np.ndarray, border: np.ndarray) -> np.ndarray:
     """Carried points evened out along the surface, but for those on a border, and drawn onto it."""
     mean, near = neighbours(faces, len(points)), union.near(points)
     for _ in range(2):
@@ -177,7 +178,9 @@ def _settle(union: Union, points, faces, border) -> np.ndarray:
     return union.project(points, 1, near=near)
 
 
-def _paint(union: Union, points, faces) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+def _paint(
+    union: Union, points: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
     """Points moved a little so that edges follow the borders of regions; which were moved; the region of each
     face; the regions' names."""
     names = sorted({r for lump in union.lumps for r in (lump.region, *(p[0] for p in lump.paint))})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 
 def surface_net(values: np.ndarray, axes: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -14,13 +14,15 @@ def surface_net(values: np.ndarray, axes: list[np.ndarray]) -> tuple[np.ndarray,
     values are positive inside. The surface stays open where it leaves the grid.
     """
     inside = values > 0.0
-    count = sum(
-        inside[i : len(inside) - 1 + i, j : inside.shape[1] - 1 + j, k : inside.shape[2] - 1 + k].astype(
-            np.int8
-        )
-        for i in (0, 1)
-        for j in (0, 1)
-        for k in (0, 1)
+    count = np.sum(
+        [
+            inside[i : len(inside) - 1 + i, j : inside.shape[1] - 1 + j, k : inside.shape[2] - 1 + k]
+            for i in (0, 1)
+            for j in (0, 1)
+            for k in (0, 1)
+        ],
+        axis=0,
+        dtype=np.int8,
     )
     cells = np.argwhere((count > 0) & (count < 8))
     number = np.full(count.shape, -1)
@@ -68,9 +70,11 @@ def line(low: float, high: float, step: float) -> np.ndarray:
     return np.linspace(low, high, max(2, round((high - low) / step) + 1))
 
 
-def sew(points, faces, more, hand, centre) -> tuple[np.ndarray, np.ndarray]:
-    """Two surfaces as one: their open edges around the axis Y through `centre` are joined by a strip of
-    triangles."""
+def sew(
+    points: np.ndarray, faces: np.ndarray, more: np.ndarray, hand: np.ndarray, centre: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two surfaces as one: their open edges around the axis Y through `centre` (3,) are joined by a strip of
+    triangles. points, more: (n, 3); faces, hand: (m, 3), into each surface's own points."""
     side = np.sign(centre[1])
     rim = open_points(faces)
     rim = rim[(points[rim, 1] * side) > 0.0]
@@ -92,8 +96,8 @@ def sew(points, faces, more, hand, centre) -> tuple[np.ndarray, np.ndarray]:
         else:
             b += 1
             strip.append([i, j, loops[1][b % len(loops[1])]])
-    strip = np.array(strip)
-    return points, np.concatenate([faces, strip if side > 0 else strip[:, ::-1]])
+    joint = np.array(strip)
+    return points, np.concatenate([faces, joint if side > 0 else joint[:, ::-1]])
 
 
 def open_points(faces: np.ndarray) -> np.ndarray:
@@ -110,9 +114,10 @@ def edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack(np.divmod(keys, count), axis=1), counts
 
 
-def neighbours(faces: np.ndarray, count: int):
+def neighbours(faces: np.ndarray, count: int) -> csr_matrix:
     """Mean over the points at the other ends of a point's edges, as a sparse (count, count) matrix."""
     pairs, _ = edges(faces)
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
     joined = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count)).tocsr()
-    return diags(1.0 / np.maximum(np.asarray(joined.sum(axis=1)).ravel(), 1.0)) @ joined
+    share = diags(1.0 / np.maximum(np.asarray(joined.sum(axis=1)).ravel(), 1.0))
+    return (share @ joined).tocsr()
