@@ -150,9 +150,18 @@ class Model:
         start = int(self.tables["link_dof"][link])
         return slice(start, start + JOINT_DOF[self.tables["link_joint"][link]])
 
+    def listed(self, text: str) -> list[str]:
+        """Names of bodies that the file lists under <custom><text name=...>, in its order; empty where it
+        does not. Raises ModelError for a name that is no body's."""
+        names = self.texts.get(text, "").split()
+        for name in names:
+            if name not in self.body_names:
+                raise ModelError(f"{self.path}: <text name=\"{text}\"> in <custom> names no body: '{name}'")
+        return names
+
     def named_bodies(self, text: str) -> set[int]:
-        """Bodies that the file lists under <custom><text name=...>; empty where it does not."""
-        return {self.body(name) for name in self.texts.get(text, "").split()}
+        """The bodies that are `listed`, by index."""
+        return {self.body(name) for name in self.listed(text)}
 
     @cached_property
     def roles(self) -> Roles:

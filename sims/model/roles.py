@@ -97,13 +97,11 @@ class Roles:
 
 
 def find_roles(model: Model) -> Roles:
-    """The roles of a model, from its texts and its tree."""
-    named = {text: words.split() for text, words in model.texts.items()}
-    said = {text: [name for name in names if name in model.body_names] for text, names in named.items()}
+    """The roles of a model, from its texts and its tree. Raises ModelError for a text that names no body."""
     root = next((n for n in model.joint_names[:1] if model.joint_type(n) == "free"), None)
-    ball = _first(said.get("ball", []))
-    head = _first(said.get("head", []))
-    hands, feet = (_carrying(model, said.get(text, [])) for text in ("hands", "feet"))
+    ball = _first(model.listed("ball"))
+    head = _first(model.listed("head"))
+    hands, feet = (_carrying(model, model.listed(text)) for text in ("hands", "feet"))
     free = [n for n in _joints(model, ball) if model.joint_type(n) == "free"]
     return Roles(
         file=str(model.path),
@@ -111,14 +109,14 @@ def find_roles(model: Model) -> Roles:
         root_body=None if root is None else model.body_names[model.joint_body(root)],
         ball=ball,
         ball_joint=_first(free),
-        trunk=_first(said.get("trunk", [])),
+        trunk=_first(model.listed("trunk")),
         head=head,
         hands=hands,
-        palms=tuple(name for name in named.get("palms", []) if name in model.sites),
-        knuckles=_knuckles(model, hands, said.get("knuckles", [])),
+        palms=tuple(name for name in model.texts.get("palms", "").split() if name in model.sites),
+        knuckles=_knuckles(model, hands, model.listed("knuckles")),
         feet=feet,
         spine=_spine(model, head),
-        toes=_toes(model, feet, said.get("feet", [])),
+        toes=_toes(model, feet, model.listed("feet")),
         **_limbs(model, hands, ("shoulders", "elbows", "wrists")),
         **_limbs(model, feet, ("hips", "knees", "ankles")),
     )

@@ -98,6 +98,12 @@ def test_one_hand_is_no_pair(load):
         found.both("hands")
 
 
+@pytest.mark.parametrize("text", ["feet", "hands", "ball", "trunk", "head", "knuckles"])
+def test_a_name_of_no_body_is_refused(load, text):
+    with pytest.raises(ModelError, match=rf"walker.xml: .*{text}.* names no body: 'u9'"):
+        load(TEXTS | {text: "u3 u9"}).roles  # noqa: B018
+
+
 def test_a_body_left_out_plays_no_part(load):
     found = load(TEXTS, without=("prop",)).roles
     assert found.ball is found.ball_joint is None and found.hands == ("u3", "v3")
