@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..planar import wrapped
 from .model import JOINT_TYPES
 
 
@@ -72,8 +73,7 @@ def zero_q(model) -> np.ndarray:
 def twist(turn: Rotation, axis: np.ndarray) -> np.ndarray:
     """The angle (frames,) [rad] about `axis` that comes nearest to each rotation."""
     q = turn.as_quat()
-    angle = 2.0 * np.arctan2(q[..., :3] @ axis, q[..., 3])
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return wrapped(2.0 * np.arctan2(q[..., :3] @ axis, q[..., 3]))
 
 
 def frame_of(direction: np.ndarray, toward: np.ndarray) -> Rotation:

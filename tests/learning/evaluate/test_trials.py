@@ -1,91 +1,23 @@
-"""Trials of policies: poses over the ground against complex numbers, what became of each trial against an
-account kept by hand."""
+"""Trials of policies: what became of each trial against an account kept by hand, poses over the ground as
+complex numbers."""
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from warpdribble.learning.evaluate.trials import (
-    States,
-    composed,
-    planar,
-    reference_states,
-    relative,
-    run_trials,
-    wrapped,
-)
+from warpdribble.learning.evaluate.trials import States, reference_states, run_trials
 from warpdribble.learning.graph import STEPS, cyclic_graph
 from warpdribble.learning.tasks.disturbance import Disturbance
 from warpdribble.learning.tasks.locomotion import FALLEN, FELT, JUDGED
 from warpdribble.sims import Simulation
 from warpdribble.sims.model import pose
+from warpdribble.sims.planar import planar
 from warpdribble.sims.worlds.simulation import FALL
-
-# ------------------------------------------------------------------------------- poses over the ground
-
-number = st.floats(-100, 100)
-triples = st.integers(1, 4).flatmap(
-    lambda n: st.tuples(*[st.lists(st.tuples(number, number, number), min_size=n, max_size=n)] * 3)
-)
-EXACT = 1e-9  # float64 of some 100 m and rad
 
 
 def complex_of(a):
     """Place and unit direction."""
     return a[:, 0] + 1j * a[:, 1], np.exp(1j * a[:, 2])
-
-
-def assert_same(a, b):
-    """The same places, and angles that differ by whole turns."""
-    np.testing.assert_allclose(a[:, :2], b[:, :2], atol=EXACT)
-    np.testing.assert_allclose(np.exp(1j * a[:, 2]), np.exp(1j * b[:, 2]), atol=EXACT)
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(triples)
-def test_going_on_and_seen_from(three):
-    """Composition is the product of complex numbers; `relative` undoes it; it is associative."""
-    a, b, c = map(np.array, three)
-    place, turn = complex_of(a)
-    there, facing = complex_of(b)
-    at, ahead = complex_of(composed(a, b))
-    np.testing.assert_allclose(at, place + turn * there, atol=EXACT)
-    np.testing.assert_allclose(ahead, turn * facing, atol=EXACT)
-    seen, way = complex_of(relative(a, b))
-    np.testing.assert_allclose(seen, (there - place) / turn, atol=EXACT)
-    np.testing.assert_allclose(way, facing / turn, atol=EXACT)
-    assert_same(composed(a, relative(a, b)), b)
-    assert_same(relative(a, composed(a, b)), b)
-    assert_same(composed(composed(a, b), c), composed(a, composed(b, c)))
-    assert_same(relative(composed(c, a), composed(c, b)), relative(a, b))  # who looks from where it is
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(st.lists(st.floats(-1000, 1000), min_size=1, max_size=5).map(np.array))
-def test_wrapped(angle):
-    inside = wrapped(angle)
-    assert (inside >= -np.pi).all() and (inside <= np.pi).all()
-    turns = (inside - angle) / (2 * np.pi)
-    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
-    near = np.abs(angle) < np.pi - 1e-9
-    np.testing.assert_allclose(inside[near], angle[near], atol=1e-12)
-
-
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(
-    st.lists(
-        st.tuples(number, number, st.floats(-3.1, 3.1), st.floats(-1.4, 1.4), st.floats(-3, 3)), min_size=1
-    )
-)
-def test_planar(cases):
-    """The heading is the yaw of yaw, pitch and roll, for a pitch short of a right angle."""
-    x, y, yaw, pitch, roll = np.array(cases).T
-    q = np.zeros((len(x), 9))
-    q[:, 0], q[:, 1], q[:, 2] = x, y, 1.0
-    q[:, 3:7] = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=1)).as_quat()
-    np.testing.assert_allclose(planar(q), np.stack([x, y, yaw], axis=1), atol=EXACT)
 
 
 # --------------------------------------------------------------------------------------------- states

@@ -1,0 +1,54 @@
+"""Place and heading over the ground: planar poses (n, 3) [m, m, rad], and what moves over it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+
+def planar(joint_q: np.ndarray) -> np.ndarray:
+    """Place and heading (n, 3) [m, m, rad] over the ground of roots, joint_q (n, 7 or more); not finite where
+    they are not."""
+    return np.stack([joint_q[:, 0], joint_q[:, 1], heading(joint_q[:, 3:7])], axis=1)
+
+
+def heading(quaternions: np.ndarray) -> np.ndarray:
+    """[rad] about the vertical (...,) of where unit quaternions (..., 4) xyzw turn +X."""
+    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    return np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+def relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Planar poses b as seen from a, all (n, 3)."""
+    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
+    x, y = (b - a)[:, :2].T
+    return np.stack([c * x + s * y, c * y - s * x, wrapped(b[:, 2] - a[:, 2])], axis=1)
+
+
+def composed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Planar poses reached by going a and from there b, all (n, 3)."""
+    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
+    x, y = a[:, 0] + c * b[:, 0] - s * b[:, 1], a[:, 1] + s * b[:, 0] + c * b[:, 1]
+    return np.stack([x, y, a[:, 2] + b[:, 2]], axis=1)
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """The same angle within half a turn [rad]."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def rotation(angle: float) -> np.ndarray:
+    """The matrix (2, 2) that turns the ground by an angle [rad]."""
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def over_ground(poses: ArrayLike, pivot: np.ndarray, place: np.ndarray, turn: float) -> np.ndarray:
+    """Poses (n, 7) [m, -], or points (n, 3) [m], turned by `turn` [rad] about the vertical through `pivot`
+    (2,), which then lies at `place` (2,)."""
+    poses = np.array(poses, dtype=float)
+    poses[:, :2] = (poses[:, :2] - pivot) @ rotation(turn).T + place
+    if poses.shape[1] > 3:
+        by = Rotation.from_rotvec([0.0, 0.0, turn])
+        poses[:, 3:] = (by * Rotation.from_quat(poses[:, 3:])).as_quat()
+    return poses
