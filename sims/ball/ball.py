@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..retarget.planting import runs
+from ..signals import runs
 from . import flight
 from .hands import Hands, find_hands
 from .possession import Flight, infer

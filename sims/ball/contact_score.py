@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from ..retarget.planting import runs
+from ..signals import runs
 
 TOLERANCE = 0.05
 """[s] A frame of contact is right when the other side has contact this near."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
-from ..retarget.planting import runs
+from ..signals import runs
 from .flight import BOUNCE, GRAVITY, flight_height, time_to_ground
 from .hands import SMOOTH, Hands
 

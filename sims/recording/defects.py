@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..signals import runs
 from . import anatomy
 from .motion import Motion
 
@@ -108,15 +109,3 @@ def frozen(motion: Motion) -> list[Event]:
             if (last - first + 1) / motion.rate >= FROZEN:
                 events.append(Event(limb, first, last + 1, (last - first + 1) / motion.rate))
     return events
-
-
-def runs(flags: np.ndarray, join: int = 0) -> list[tuple[int, int]]:
-    """First and last index of each row of true values; rows parted by `join` or fewer false ones are one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(flags, int), [0]])))
-    found: list[tuple[int, int]] = []
-    for first, stop in zip(edges[::2], edges[1::2]):
-        if found and first - found[-1][1] - 1 <= join:
-            found[-1] = (found[-1][0], int(stop) - 1)
-        else:
-            found.append((int(first), int(stop) - 1))
-    return found

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..signals import interpolate_lines, interpolate_rotations
+
 RECORDED = ("positions", "ball", "ball_held")
 """What only some formats record, a row per frame; None in a motion without it."""
 
@@ -141,29 +143,3 @@ def _forward(parents, offsets, rotations, root_position):
         frames.append(parent * Rotation.from_quat(rotations[:, joint]))
         positions[:, joint] = positions[:, parents[joint]] + parent.apply(offsets[joint])
     return positions, np.stack([f.as_quat() for f in frames], axis=1)
-
-
-def interpolate_lines(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Linear interpolation of values (frames, ...) at fractional frame numbers `at` (n,)."""
-    low, share = _bracket(len(values), at)
-    share = share.reshape(-1, *(1,) * (values.ndim - 1))
-    high = np.minimum(low + 1, len(values) - 1)
-    return values[low] + share * (values[high] - values[low])
-
-
-def interpolate_rotations(quaternions: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Geodesic interpolation of quaternions (frames, ..., 4) xyzw at fractional frame numbers
-    `at` (n,)."""
-    low, share = _bracket(len(quaternions), at)
-    high = np.minimum(low + 1, len(quaternions) - 1)
-    shape = (len(at), *quaternions.shape[1:])
-    start = Rotation.from_quat(quaternions[low].reshape(-1, 4))
-    turn = (start.inv() * Rotation.from_quat(quaternions[high].reshape(-1, 4))).as_rotvec()
-    turn = turn.reshape(*shape[:-1], 3) * share.reshape(-1, *(1,) * (len(shape) - 1))
-    return (start * Rotation.from_rotvec(turn.reshape(-1, 3))).as_quat().reshape(shape)
-
-
-def _bracket(frames: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    at = np.clip(np.asarray(at, dtype=float), 0.0, frames - 1.0)
-    low = np.minimum(at.astype(int), max(frames - 2, 0))
-    return low, at - low

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, find_peaks, sosfiltfilt
+from scipy.signal import find_peaks
 
+from ..signals import low_pass, runs, speed
 from . import anatomy, defects
 from .defects import Event
 from .motion import Motion
@@ -64,13 +65,13 @@ def examine(motion: Motion, first_frame: int = 0) -> Quality:
     """The quality report of a motion. first_frame: number of its first frame in the clip it was cut from."""
     feet, ground, under = stance(motion)
     level = 0.0 if np.isnan(ground) else ground
-    speed = _root_speed(motion)
+    fast = _root_speed(motion)
     return Quality(
         frames=motion.frame_count,
         rate=float(motion.rate),
         duration=float(motion.duration),
-        root_speed_mean=float(speed.mean()),
-        root_speed_max=float(speed.max()),
+        root_speed_mean=float(fast.mean()),
+        root_speed_max=float(fast.max()),
         ground=ground,
         hands=_hands(motion, level, first_frame),
         feet={s: Foot([_from(first_frame, c) for c in f.contacts], f.slide) for s, f in feet.items()},
@@ -84,10 +85,7 @@ def examine(motion: Motion, first_frame: int = 0) -> Quality:
 
 def _root_speed(motion: Motion) -> np.ndarray:
     """Horizontal speed (frames,) [m/s] of the root, low-pass filtered."""
-    if motion.frame_count < 2:
-        return np.zeros(1)
-    path = low_pass(motion.root_position[:, :2], motion.rate, SMOOTH)
-    return np.linalg.norm(np.gradient(path, axis=0), axis=1) * motion.rate
+    return speed(low_pass(motion.root_position[:, :2], motion.rate, SMOOTH), motion.rate)
 
 
 def _hands(motion: Motion, ground: float, first_frame: int) -> dict[str, Hand]:
@@ -115,7 +113,7 @@ def _hands(motion: Motion, ground: float, first_frame: int) -> dict[str, Hand]:
 def _held(motion: Motion, first_frame: int) -> list[tuple[int, int]] | None:
     if motion.ball_held is None:
         return None
-    return [_from(first_frame, run) for run in defects.runs(motion.ball_held)]
+    return [_from(first_frame, run) for run in runs(motion.ball_held)]
 
 
 def _bounces(motion: Motion, first_frame: int) -> list[int] | None:
@@ -132,11 +130,3 @@ def _moved(events: list[Event], first_frame: int) -> list[Event]:
 
 def _from(first_frame: int, run: tuple[int, int]) -> tuple[int, int]:
     return run[0] + first_frame, run[1] + first_frame
-
-
-def low_pass(values: np.ndarray, rate: float, cut_off: float) -> np.ndarray:
-    """Butterworth low-pass along axis 0, forward and backward so that nothing is delayed; what is too
-    short or too slow to filter is returned as it is."""
-    if len(values) < 16 or cut_off >= 0.45 * rate:
-        return values
-    return sosfiltfilt(butter(2, cut_off, fs=rate, output="sos"), values, axis=0)

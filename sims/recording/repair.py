@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..signals import continuous, interpolate_lines, interpolate_rotations, low_pass
 from . import anatomy, defects
-from .motion import RECORDED, Motion, interpolate_lines, interpolate_rotations
-from .quality import low_pass
+from .motion import RECORDED, Motion
 from .stance import stance
 
 REPAIRS = ("spikes", "toes", "lowpass", "ground")
@@ -126,13 +126,6 @@ def smooth(rotations: np.ndarray, rate: float, cut_off: float) -> np.ndarray:
         return rotations
     filtered = low_pass(continuous(rotations), rate, cut_off)
     return filtered / np.linalg.norm(filtered, axis=-1, keepdims=True)
-
-
-def continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (frames, ..., 4) with the sign that makes each the nearer one to the one before."""
-    along = np.sum(quaternions[1:] * quaternions[:-1], axis=-1)
-    sign = np.cumprod(np.where(along < 0.0, -1.0, 1.0), axis=0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * sign[..., None]])
 
 
 def _off_rotations(quaternions: np.ndarray) -> np.ndarray:

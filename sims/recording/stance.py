@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..signals import runs, speed
 from . import anatomy
-from .defects import Event, places, runs
+from .defects import Event, places
 from .motion import Motion
 
 SLOW = 0.5
@@ -47,8 +48,8 @@ def stance(motion: Motion) -> tuple[dict[str, Foot], float, list[Event]]:
         stands = _stands(where[:, points[:2]], motion.rate)
         lowest[side] = where[:, points, 2].min(axis=1)
         ground.append(lowest[side][stands])
-        speed = _speed(where[:, points[min(1, len(points) - 1)], :2], motion.rate)
-        slide = float(np.median(speed[stands])) if stands.any() else 0.0
+        moving = speed(where[:, points[min(1, len(points) - 1)], :2], motion.rate)
+        slide = float(np.median(moving[stands])) if stands.any() else 0.0
         feet[side] = Foot(runs(stands), slide)
     level = np.concatenate(ground) if ground else np.zeros(0)
     height = float(np.median(level)) if len(level) else float("nan")
@@ -64,8 +65,7 @@ def _stands(points: np.ndarray, rate: float) -> np.ndarray:
     """Frames (frames,) bool in which a foot stands on one of its points (frames, points, 3)."""
     stands = np.zeros(len(points), bool)
     for point in np.moveaxis(points, 1, 0):
-        speed = _speed(point, rate)
-        slow = speed < SLOW
+        slow = speed(point, rate) < SLOW
         if slow.any():
             level = np.quantile(point[slow, 2], 0.1)
             stands |= slow & (point[:, 2] < level + NEAR)
@@ -74,10 +74,3 @@ def _stands(points: np.ndarray, rate: float) -> np.ndarray:
     for first, last in runs(stands, join=short):
         kept[first : last + 1] = last - first + 1 > short
     return kept
-
-
-def _speed(path: np.ndarray, rate: float) -> np.ndarray:
-    """Speed (frames,) [m/s] along a path (frames, n) [m]."""
-    if len(path) < 2:
-        return np.zeros(len(path))
-    return np.linalg.norm(np.gradient(path, axis=0), axis=1) * rate

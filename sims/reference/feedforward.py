@@ -10,10 +10,10 @@ centre of mass, where the zero moment point is.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ..model import gaps, pose
+from ..signals import low_pass
 from .reference import Reference, integrate, root_joint
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -83,7 +83,7 @@ def _acceleration(places: np.ndarray, timestep: float) -> np.ndarray:
     """Second derivative (frames, n, 3) of smoothed places."""
     if len(places) < 32:
         return np.zeros_like(places)
-    smooth = sosfiltfilt(butter(2, SMOOTH, fs=1.0 / timestep, output="sos"), places, axis=0)
+    smooth = low_pass(places, 1.0 / timestep, SMOOTH)
     return np.gradient(np.gradient(smooth, timestep, axis=0), timestep, axis=0)
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..recording.motion import interpolate_lines, interpolate_rotations
+from ..planar import heading, over_ground, rotation, wrapped
+from ..signals import interpolate_lines, interpolate_rotations, smoothstep
 
 ALONG = 0.05
 """[m] What is loose goes along with a cycle that it ends this near to where the next begins."""
@@ -87,7 +88,7 @@ class Cycle:
         anchor = self.reference.joint_q[0, free[0]][:2]
         place = np.zeros(2)
         for i in range(number):
-            place = place + _plane(i * self.turn) @ np.asarray(self.travel)
+            place = place + rotation(i * self.turn) @ np.asarray(self.travel)
         joint_q = joint_q.copy()
         for part in free:
             joint_q[:, part] = over_ground(joint_q[:, part], anchor, anchor + place, number * self.turn)
@@ -104,8 +105,7 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     """
     root = model.q_slice(root_joint(model))
     first, last = reference.joint_q[0], reference.joint_q[-1]
-    turn = _heading(last[root]) - _heading(first[root])
-    turn = float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    turn = float(wrapped(heading(last[root][3:]) - heading(first[root][3:])))
     travel = last[root][:2] - first[root][:2]
     if np.linalg.norm(travel) < travel_above and abs(turn) < turn_above:
         turn, travel = 0.0, np.zeros(2)
@@ -117,12 +117,12 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     if reference.frame_count < 8:
         faster[:] = 0.0
     lines = model.dof_slice(root_joint(model)).start
-    ahead = _plane(turn) @ _speed(model, reference, slice(0, 4))[lines : lines + 2]
+    ahead = rotation(turn) @ _speed(model, reference, slice(0, 4))[lines : lines + 2]
     faster[lines : lines + 2] += ahead - _speed(model, reference, slice(0, 4))[lines : lines + 2]
     span = min(BLEND, 0.5 * reference.duration)
     before = reference.duration - reference.timestep * np.arange(reference.frame_count)
     share = np.clip(1.0 - before / span, 0.0, 1.0)[:, None]
-    bend = share**2 * (3.0 - 2.0 * share) * missing + share**2 * (share - 1.0) * span * faster
+    bend = smoothstep(share) * missing + share**2 * (share - 1.0) * span * faster
     closed = integrate(model, reference.joint_q, bend)
     size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
     return Cycle(replace(reference, joint_q=closed), turn, tuple(travel.tolist()), float(size))
@@ -195,23 +195,3 @@ def _joint_dofs(model) -> np.ndarray:
 def _turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     start, shape = Rotation.from_quat(start.reshape(-1, 4)), start.shape[:-1]
     return (start.inv() * Rotation.from_quat(end.reshape(-1, 4))).as_rotvec().reshape(*shape, 3)
-
-
-def _heading(pose: np.ndarray) -> float:
-    """[rad] about the vertical of a root pose (7,)."""
-    forward = Rotation.from_quat(pose[3:]).apply([1.0, 0.0, 0.0])
-    return float(np.arctan2(forward[1], forward[0]))
-
-
-def _plane(angle: float) -> np.ndarray:
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def over_ground(poses, pivot, place, turn: float) -> np.ndarray:
-    """Root poses (frames, 7) turned about the vertical through `pivot` (2,), which then lies at
-    `place` (2,)."""
-    poses = np.array(poses, dtype=float)
-    poses[:, :2] = (poses[:, :2] - pivot) @ _plane(turn).T + place
-    by = Rotation.from_rotvec([0.0, 0.0, turn])
-    poses[:, 3:] = (by * Rotation.from_quat(poses[:, 3:])).as_quat()
-    return poses

@@ -15,6 +15,8 @@ from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial.transform import Rotation
 
 from ..model import gaps, pose
+from ..planar import wrapped
+from ..signals import runs, smoothstep
 
 SLOW = 0.45
 """[m/s] A point of the sole that stands is slower than this ..."""
@@ -97,7 +99,7 @@ def find_stands(foot: Foot, ankle: np.ndarray, turn: Rotation, timestep: float) 
     pitch = pitch - (np.clip(np.median(pitch[flat]), -0.25, 0.25) if flat.any() else 0.0)
     toe = (ankle + turn.apply(foot.ball))[:, :2]
     stands = []
-    for first, last in runs(heel | ball, max(2, round(SHORTEST / timestep))):
+    for first, last in runs(heel | ball, shortest=max(2, round(SHORTEST / timestep))):
         part = slice(first, last + 1)
         best = next(m for m in (flat[part], ball[part], heel[part]) if m.any())
         facing = np.unwrap(yaw[part])
@@ -121,7 +123,7 @@ def _heel_up(foot: Foot, ankle: np.ndarray, place: np.ndarray, yaw: np.ndarray) 
     back = np.sum((ankle[:, :2] - place) * ahead, axis=1)
     flat = np.arctan2(-foot.ball[2], -foot.ball[0])
     turned = flat - np.arctan2(ankle[:, 2] - foot.drop, back)
-    return np.clip((turned + np.pi) % (2.0 * np.pi) - np.pi, -0.5, 1.1)
+    return np.clip(wrapped(turned), -0.5, 1.1)
 
 
 def standing_foot(foot: Foot, stand: Stand) -> tuple[np.ndarray, Rotation]:
@@ -179,12 +181,6 @@ def heading(turn: Rotation) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(forward[:, 1], forward[:, 0]), np.arcsin(np.clip(-forward[:, 2], -1.0, 1.0))
 
 
-def runs(true: np.ndarray, shortest: int = 1) -> list[tuple[int, int]]:
-    """First and last row of every stretch of a (frames,) bool array that lasts `shortest` rows."""
-    edge = np.flatnonzero(np.diff(np.concatenate([[0], true.astype(int), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edge[::2], edge[1::2]) if b - a >= shortest]
-
-
 def _touching(foot: Foot, ankle, turn: Rotation, timestep: float) -> np.ndarray:
     """(2, frames) bool: the heel touches, the ball of the foot touches."""
     heights = sole_heights(foot, ankle, turn)
@@ -206,6 +202,5 @@ def _between(known: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndar
     after = np.clip(np.searchsorted(known, rows), 0, len(known) - 1)
     before = np.clip(after - (known[after] > rows), 0, len(known) - 1)
     gap = np.maximum(known[after] - known[before], 1)
-    share = np.clip((rows - known[before]) / gap, 0.0, 1.0)[:, None]
-    share = share**2 * (3.0 - 2.0 * share)
+    share = smoothstep(np.clip((rows - known[before]) / gap, 0.0, 1.0))[:, None]
     return values[before] + share * (values[after] - values[before])

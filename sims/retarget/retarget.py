@@ -13,12 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ..model import gaps, pose
 from ..recording.motion import Motion
 from ..reference.reference import Reference, root_joint
+from ..signals import low_pass
 from .calibrate import match_limbs, rest_by_directions, since_rest
 from .mapping import Mapping, find_mapping
 from .planting import Foot, Stand, find_foot, find_stands, planted, sole_heights
@@ -206,9 +206,7 @@ def _root(model, goals, mapping: Mapping, turned) -> np.ndarray:
 
 def _smooth(turns: Rotation, cut_off: float, rate: float) -> Rotation:
     """Low-pass filter of rotations, forward and backward so that nothing is delayed."""
-    if len(turns) < 16 or cut_off >= 0.45 * rate:
-        return turns
     middle = turns.mean()
     steps = (middle.inv() * turns).as_rotvec()
-    filtered = sosfiltfilt(butter(2, cut_off, fs=rate, output="sos"), steps, axis=0)
-    return middle * Rotation.from_rotvec(filtered)
+    filtered = low_pass(steps, rate, cut_off)
+    return turns if filtered is steps else middle * Rotation.from_rotvec(filtered)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom, Vt
 
+from ..sims.signals import continuous
 from ..skin import meshes
 from . import scene, usdphysics
 from .names import prim_names
@@ -126,8 +127,4 @@ def continuous_quaternions(quaternions: np.ndarray) -> np.ndarray:
     """The same rotations (frames, ..., 4), normalised, with signs so that neighbouring frames are near each
     other."""
     quaternions = np.asarray(quaternions, float)
-    quaternions = quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    flips = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0
-    signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
-    quaternions[1:] *= signs[..., None]
-    return quaternions
+    return continuous(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from warpdribble.sims.recording.motion import Motion, interpolate_rotations
+from warpdribble.sims.recording.motion import Motion
 
 NAMES, PARENTS = ("hips", "spine", "arm", "leg"), np.array([-1, 0, 1, 0])
 
@@ -70,13 +70,6 @@ def test_resampling_up_and_down_again_returns_the_frames():
     motion = wave()
     back = motion.resample(4 * motion.rate).resample(motion.rate)
     assert np.allclose(back.forward()[0], motion.forward()[0], atol=1e-9)
-
-
-def test_interpolation_is_a_geodesic_whatever_the_signs():
-    ends = Rotation.from_rotvec([[0.0, 0.0, 0.2], [0.0, 0.0, 1.4]]).as_quat()
-    for sign in (1.0, -1.0):
-        between = interpolate_rotations(np.stack([ends[0], sign * ends[1]]), np.array([0.25]))
-        assert np.allclose(Rotation.from_quat(between).as_rotvec(), [[0.0, 0.0, 0.5]])
 
 
 def test_slice_includes_both_ends_and_refuses_what_is_not_there():

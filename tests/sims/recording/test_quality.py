@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpdribble.clips.read import read_clip, read_part
-from warpdribble.sims.recording.defects import runs
 from warpdribble.sims.recording.motion import Motion
 from warpdribble.sims.recording.quality import examine
 
@@ -76,12 +75,6 @@ def test_bounces_of_a_recorded_ball():
 def test_short_motions_are_measured_without_complaint(frames):
     quality = examine(standing(frames))
     assert quality.frames == frames and np.isfinite(quality.root_speed_max)
-
-
-def test_runs():
-    assert runs(np.array([1, 1, 0, 0, 1], bool)) == [(0, 1), (4, 4)]
-    assert runs(np.array([1, 1, 0, 0, 1], bool), join=2) == [(0, 4)]
-    assert runs(np.zeros(3, bool)) == []
 
 
 # clip -> frames where the data's description knows of a jump (README of the recordings)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from warpdribble.clips.read import read_clip
 from warpdribble.sims.recording.motion import Motion
 from warpdribble.sims.recording.quality import examine
-from warpdribble.sims.recording.repair import REPAIRS, continuous, repair, smooth
+from warpdribble.sims.recording.repair import REPAIRS, repair, smooth
 
 RATE = 120.0
 NAMES, PARENTS = ("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase"), np.array([-1, 0, 1, 2, 3])
@@ -99,13 +99,6 @@ def test_a_low_pass_does_not_depend_on_signs_or_on_the_frame(seed):
     filtered = Rotation.from_quat(smooth(path.as_quat() * signs, RATE, 6.0))
     turned = Rotation.from_quat(smooth((left * path * right).as_quat(), RATE, 6.0))
     assert (turned.inv() * (left * filtered * right)).magnitude().max() < 1e-6
-
-
-def test_signs_become_continuous():
-    path = Rotation.from_rotvec(np.linspace(0, 4, 50)[:, None] * [1.0, 0, 0]).as_quat()
-    path[10:20] *= -1.0
-    along = np.sum(np.diff(continuous(path), axis=0) ** 2, axis=-1)
-    assert along.max() < 0.01
 
 
 def test_recorded_positions_are_repaired_and_a_ball_is_not(mocap):

@@ -8,7 +8,6 @@ from warpdribble.sims.retarget.planting import (
     find_foot,
     find_stands,
     planted,
-    runs,
     sole_heights,
     standing_foot,
 )
@@ -79,9 +78,3 @@ def test_no_stand_leaves_the_foot_as_it_is(foot):
     ankle[:, 2] += 0.5
     assert find_stands(foot, ankle, turn, 0.01) == []
     assert np.array_equal(planted(foot, ankle, turn, [])[0], ankle)
-
-
-def test_runs():
-    assert runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
-    assert runs(np.array([True, True, False, True]), 2) == [(0, 1)]
-    assert runs(np.zeros(3, bool)) == []
