@@ -1,38 +1,41 @@
-"""Files that are whole at any moment, whatever stops the program."""
+"""Arrays in files, what to do about damaged ones, and who holds a folder."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
+import socket
+import time
 import zipfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 
-PART = ".part-"
-"""Before the name of a file that is being written."""
+from ...sims.errors import InputError
+from ...sims.files import whole
 
-
-@contextlib.contextmanager
-def whole(path: Path):
-    """A name beside `path` to write to, which takes its place at the end."""
-    part = path.with_name(PART + path.name)
-    yield part
-    with open(part, "rb+") as file:
-        os.fsync(file.fileno())
-    os.replace(part, path)
+LOCK = "lock"
 
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
     """Write an .npz file."""
     with whole(path) as part, open(part, "wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a .json file."""
+    with whole(path) as part:
+        part.write_text(json.dumps(value, indent=2) + "\n", encoding="utf-8")
 
 
 @contextlib.contextmanager
-def said_if_damaged(path: Path, remedy: str):
-    """Turn whatever reading a damaged file raises into a ValueError of one line with the remedy."""
+def said_if_damaged(path: Path, remedy: str, hint: str = "") -> Iterator[None]:
+    """Turn whatever reading a damaged file raises into an InputError of one line with the remedy."""
     try:
         yield
     except (FileNotFoundError, PermissionError):
@@ -48,10 +51,61 @@ def said_if_damaged(path: Path, remedy: str):
         ValueError,
     ) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise ValueError(f"{path} is damaged ({reason}): {remedy}") from None
+        raise InputError(f"is damaged ({reason}): {remedy}", path, hint) from None
 
 
-def read_arrays(path: Path, remedy: str) -> dict[str, np.ndarray]:
-    """All arrays of an .npz file. Raises ValueError, with the remedy, for a damaged one."""
-    with said_if_damaged(path, remedy), np.load(path, allow_pickle=False) as file:
+def read_arrays(path: Path, remedy: str, hint: str = "") -> dict[str, np.ndarray]:
+    """All arrays of an .npz file. Raises InputError, with the remedy, for a damaged one."""
+    with said_if_damaged(path, remedy, hint), np.load(path, allow_pickle=False) as file:
         return {name: file[name] for name in file.files}
+
+
+def mapped(path: Path, shape: tuple[int, ...], dtype: Any = np.float32) -> np.ndarray:
+    """A file as an array, made where there is none: for what would be too large to write with every checkpoint.
+    A checkpoint says how much of it counts; what was written later is written again."""
+    if path.exists():
+        array = np.lib.format.open_memmap(path, mode="r+")
+        if array.shape != shape or array.dtype != dtype:
+            raise InputError(f"has {array.shape} numbers, not {shape}", path, "out")
+        return array
+    return np.lib.format.open_memmap(path, mode="w+", dtype=dtype, shape=shape)
+
+
+@contextlib.contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Hold a folder, so that no other process writes to it. Raises InputError that names who holds it."""
+    path = folder / LOCK
+    with open(path, "a+", encoding="utf-8") as file:
+        if not _lock(file):
+            file.seek(0)
+            holder = " ".join(file.read().split()) or "another process"
+            raise InputError(f"is being written by {holder}: wait until it is done", folder, "out")
+        file.seek(0)
+        file.truncate()
+        since = time.strftime("%Y-%m-%d %H:%M:%S")
+        file.write(f"process {os.getpid()} on {socket.gethostname()} since {since}\n")
+        file.flush()
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _lock(file: IO[str]) -> bool:
+    """Lock an open file until it is closed, whatever ends the process; whether that was possible."""
+    try:
+        import fcntl
+    except ModuleNotFoundError:  # Windows
+        import msvcrt
+
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+        except OSError:
+            return False
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

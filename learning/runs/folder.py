@@ -1,11 +1,13 @@
-"""The folder of one learning run: all that learning goes on from, and all that using its policy takes.
+"""The folder of a run: a skill, its control graph, and what each stage has learned for it.
 
-    config.json      what makes the run the one it is
+    run.json         what makes the run the one it is: the skill, the seed
     skill.toml       the skill, as it was given
     graph.npz        its control graph; the clip is not needed any more
-    checkpoint.npz   `Samcon.saved` after the last iteration
-    policy.npz       the best policy so far, and states to start it from
-    progress.csv     a row per iteration, and the same in tensorboard/
+    <stage>/
+        config.json      the stage's parameters
+        checkpoint.npz   the learner's state
+        policy.npz       its best result so far, and states to start it from
+        progress.csv     a row per iteration, and the same in tensorboard/
 
 Every file is replaced as a whole, the checkpoint last: stopped at any moment, learning goes on as if it had
 not been.
@@ -13,199 +15,234 @@ not been.
 
 from __future__ import annotations
 
-import contextlib
 import json
-import tempfile
-import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ... import __version__
 from ...assets import path as asset
-from ..evaluate.trials import States
+from ...sims.errors import InputError
+from ...sims.files import PART, check_folder, sweep, whole
 from ..graph import ControlGraph
-from ..methods.samcon import Progress, Samcon, SamconConfig
-from ..policies.linear import LinearPolicy
-from ..tasks.locomotion import WEIGHTS, CostWeights, Locomotion, locomotion_model
-from .files import PART, read_arrays, said_if_damaged, whole, write_arrays
+from ..rollout import Controller
+from ..starts import Starts
+from ..tasks.locomotion import Locomotion
+from .files import LOCK, read_arrays, said_if_damaged, write_arrays, write_json
 from .log import Log
+from .stage import Arrays, Context, Learner, Stage
 
-CONFIG, SKILL, GRAPH = "config.json", "skill.toml", "graph.npz"
-CHECKPOINT, POLICY = "checkpoint.npz", "policy.npz"
+RUN, SKILL, GRAPH = "run.json", "skill.toml", "graph.npz"
+CONFIG, CHECKPOINT, RESULT = "config.json", "checkpoint.npz", "policy.npz"
 CONTROLLERS = "controllers"
-FREE = ("version", "samcon.iterations")
-"""Keys in which a run may differ from the one that it goes on from."""
 SECONDS = "seconds"
+FREE = ("version", "iterations")
+"""Keys in which what is asked for may differ from what there is."""
 
 
 @dataclass(frozen=True)
-class RunConfig:
-    """What a run depends on; the device it runs on does not count."""
+class Run:
+    """A run on disk."""
 
-    skill: dict
-    """the skill's fields, of which "name" and "description" are shown"""
-    samcon: SamconConfig = field(default=SamconConfig())
-    seed: int = 0
-    weights: CostWeights = field(default=WEIGHTS)
-    trial_worlds: int = 256
-    """trials of a check"""
-    stage: str = "locomotion"
-    version: str = __version__
-    """of warpdribble"""
+    folder: Path
+    info: dict[str, Any]
+    """as in run.json: "skill" (a table), "seed", "version\""""
 
-    def plain(self) -> dict:
-        """As JSON has it."""
-        return json.loads(json.dumps(asdict(self)))
+    @staticmethod
+    def begin(folder: str | Path, skill: dict[str, Any], seed: int = 0) -> Run:
+        """A new run, or the one that is there and goes on. Raises InputError for a folder that holds another
+        run, or anything else."""
+        folder = Path(folder)
+        info = json.loads(json.dumps({"skill": skill, "seed": seed, "version": __version__}))
+        stored = _stored(folder)
+        if stored is not None and (apart := differences(stored, info)):
+            raise InputError(f"holds another run: {apart[0]}", folder, "out")
+        try:
+            check_folder(folder)
+            sweep(folder)
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror or error}", folder, "out") from None
+        return Run(folder, stored or info)
 
+    @staticmethod
+    def load(folder: str | Path) -> Run:
+        """One that is there, or a shipped controller by name. Raises InputError for what is no run."""
+        folder = Path(folder)
+        if not folder.exists() and str(folder) in shipped_controllers():
+            folder = asset(CONTROLLERS) / folder
+        if not folder.is_dir():
+            known = ", ".join(shipped_controllers())
+            raise InputError(f"no such folder ({known} ships)", folder, "learn")
+        if not (folder / RUN).exists():
+            raise InputError("holds no run", folder, "run")
+        return Run(folder, _read_info(folder))
 
-class RunFolder:
-    """A run's folder while it is learned: a new one, or one that goes on."""
-
-    def __init__(self, folder: str | Path, config: RunConfig, iterations: int | None = None):
-        """iterations: in all; None for what the run was begun with, or the config has. Raises ValueError for
-        a folder that holds another run, or anything else."""
-        self.folder = Path(folder)
-        stored = _stored(self.folder)
-        if stored is not None:
-            apart = differences(stored, config.plain())
-            if apart:
-                raise ValueError(f"{self.folder} holds another run: {apart[0]}; give another --out")
-            iterations = iterations or stored["samcon"]["iterations"]
-        iterations = iterations or config.samcon.iterations
-        self.config = replace(config, samcon=replace(config.samcon, iterations=iterations))
-        self.saved = 0
-        """iterations in the checkpoint"""
-        self._seconds = 0.0
-        _check_writable(self.folder)
+    @property
+    def seed(self) -> int:
+        return int(self.info["seed"])
 
     @property
     def begun(self) -> bool:
         """Whether its graph is there already."""
         return (self.folder / GRAPH).exists()
 
-    def graph(self, skill_text: str, make: Callable[[], ControlGraph]) -> ControlGraph:
-        """The run's graph; made and kept, with the skill's file, where the run is new."""
-        path = self.folder / GRAPH
-        if not self.begun:
-            graph = make()
-            self._write_config(self.config.samcon.iterations)
-            with whole(self.folder / SKILL) as part:
-                part.write_text(skill_text, encoding="utf-8")
-            with whole(path) as part:
-                graph.save(part)
-        return _read_graph(path)
+    def keep(self, skill_text: str, make: Callable[[], ControlGraph]) -> None:
+        """Make the graph and keep it with the skill's file, where the run is new."""
+        if self.begun:
+            return
+        graph = make()
+        write_json(self.folder / RUN, self.info)
+        with whole(self.folder / SKILL) as part:
+            part.write_text(skill_text, encoding="utf-8")
+        with whole(self.folder / GRAPH) as part:
+            graph.save(part)
 
-    def samcon(self, graph: ControlGraph, device: str = "cpu") -> Samcon:
-        """The learner, where the checkpoint has it. Raises ValueError for a damaged checkpoint."""
-        c, model = self.config, locomotion_model()
-        tasks = [
-            Locomotion(model, graph, worlds, device, weights=c.weights)
-            for worlds in (c.samcon.islands * c.samcon.particles, c.trial_worlds)
-        ]
-        samcon = Samcon(*tasks, c.samcon, c.seed)
-        path = self.folder / CHECKPOINT
-        if path.exists():
-            remedy = "delete it to learn from the start, or give another --out"
-            state = read_arrays(path, remedy)
-            with said_if_damaged(path, remedy):
-                self._seconds = float(state.pop(SECONDS))
-                for name, array in samcon.saved.items():
-                    if "states." not in name and state[name].shape != array.shape:
-                        raise ValueError(f"{name} has the shape {state[name].shape}")
-                samcon.resume(state)
-            self.saved = samcon.iteration
-        return samcon
+    @property
+    def graph(self) -> ControlGraph:
+        with said_if_damaged(self.folder / GRAPH, "learn again", "out"):
+            return ControlGraph.load(self.folder / GRAPH)
 
-    def learn(self, samcon: Samcon, progress: Callable[[Progress], None] | None = None) -> bool:
-        """Iterate to the end, saving all of it after every iteration. Returns whether TensorBoard's files
-        were written too."""
-        self._write_config(max(samcon.config.iterations, samcon.iteration))
-        names = [f.name for f in fields(Progress)] + [SECONDS]
-        began = time.perf_counter() - self._seconds
-        with contextlib.closing(Log(self.folder, names, samcon.iteration)) as log:
-            while samcon.iteration < samcon.config.iterations:
-                report = samcon.iterate()
-                self._seconds = time.perf_counter() - began
-                log.add(asdict(report) | {SECONDS: self._seconds})
-                if np.isfinite(report.survived):
-                    self._write_policy(samcon)
-                seconds = np.array(self._seconds)
-                write_arrays(self.folder / CHECKPOINT, samcon.saved | {SECONDS: seconds})
-                self.saved = samcon.iteration
-                if progress:
-                    progress(report)
-        return log.has_events
+    def stage(self, stage: Stage) -> StageFolder:
+        return StageFolder(self.folder / stage.name, stage)
 
-    def _write_config(self, iterations: int) -> None:
-        config = replace(self.config, samcon=replace(self.config.samcon, iterations=iterations))
-        with whole(self.folder / CONFIG) as part:
-            part.write_text(json.dumps(config.plain(), indent=2) + "\n", encoding="utf-8")
+    def context(self, stage: Stage, config: Any, device: str = "cpu", workers: int = 1) -> Context:
+        """For a learner of a stage. Raises InputError where a stage that it needs has not been learned."""
+        folder = self.folder / stage.name
+        needs = {need: read_result(self.folder / need) for need in stage.needs}
+        return Context(self.graph, config, self.seed, device, workers, folder, needs)
 
-    def _write_policy(self, samcon: Samcon) -> None:
-        states = {f"states.{name}": value for name, value in vars(samcon.best_states).items()}
-        iteration = np.array(samcon.iteration)
-        write_arrays(self.folder / POLICY, vars(samcon.best) | states | {"iteration": iteration})
+    def learned(self, stages: Mapping[str, Stage], name: str = "") -> Learned:
+        """What a stage has learned, by default the last of `stages` that has. Raises InputError where none
+        has."""
+        there = [s for s in stages if (self.folder / s / CONFIG).exists()]
+        if name and name not in stages:
+            raise InputError(f"there is no stage '{name}'; there are {', '.join(stages)}", self.folder)
+        if not there or (name and name not in there):
+            raise InputError(f"has no policy yet, {name or 'nothing'} was learned", self.folder, "learn")
+        done = [s for s in there if (self.folder / s / RESULT).exists()]
+        stage = stages[name or (done or there)[-1]]
+        folder = self.stage(stage)
+        arrays = read_result(folder.path)
+        context = self.context(stage, folder.config())
+        with said_if_damaged(folder.path / RESULT, RESULT_REMEDY):
+            return Learned(
+                self,
+                stage,
+                context,
+                stage.controller(context, arrays),
+                _starts(arrays),
+                int(arrays["iteration"]),
+            )
 
 
 @dataclass(frozen=True)
-class Run:
-    """What has been learned, ready for use."""
+class Learned:
+    """What a stage has learned, ready for use."""
 
-    folder: Path
-    config: dict
-    """as in config.json"""
-    graph: ControlGraph
-    policy: LinearPolicy
+    run: Run
+    stage: Stage
+    context: Context
+    controller: Controller
     """the best so far"""
-    states: States
+    starts: Starts
     """to start it from"""
     iteration: int
     """after which it was written"""
-    weights: CostWeights
 
-    @staticmethod
-    def load(folder: str | Path) -> Run:
-        """Read a run's folder, or a shipped controller by name. Raises ValueError, one line, for what is no
-        run or has no policy yet."""
-        folder = Path(folder)
-        if not folder.exists() and str(folder) in shipped_controllers():
-            folder = asset(CONTROLLERS) / folder
-        if not folder.is_dir():
-            known = ", ".join(shipped_controllers())
-            raise ValueError(
-                f"{folder}: no such folder; warpdribble learn SKILL --out {folder} makes it ({known} ships)"
-            )
-        if not (folder / CONFIG).exists():
-            raise ValueError(f"{folder} holds no run; give a folder that warpdribble learn wrote")
-        config = _read_config(folder)
-        if not (folder / GRAPH).exists() or not (folder / POLICY).exists():
-            check = config["samcon"]["check_every"]
-            raise ValueError(
-                f"{folder} has no policy yet, the first comes after {check} iterations: "
-                "let it go on with the same warpdribble learn"
-            )
-        with said_if_damaged(folder / CONFIG, "learn again with another --out"):
-            weights = CostWeights(**config["weights"])
-        graph = _read_graph(folder / GRAPH)
-        path, remedy = folder / POLICY, "delete it and learn on (more --iterations): a check writes it anew"
-        arrays = read_arrays(path, remedy)
-        with said_if_damaged(path, remedy):
-            return Run(
-                folder=folder,
-                config=config,
-                graph=graph,
-                policy=LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy))),
-                states=States(*(arrays[f"states.{f.name}"] for f in fields(States))),
-                iteration=int(arrays["iteration"]),
-                weights=weights,
-            )
+    @property
+    def graph(self) -> ControlGraph:
+        return self.context.graph
+
+    @property
+    def skill(self) -> dict[str, Any]:
+        return dict(self.run.info["skill"])
 
     def task(self, worlds: int, device: str = "cpu") -> Locomotion:
-        """Worlds in which the policy can be tried."""
-        return Locomotion(locomotion_model(), self.graph, worlds, device, weights=self.weights)
+        """Worlds in which it can be tried."""
+        return self.stage.task(replace(self.context, device=device), worlds)
+
+
+@dataclass(frozen=True)
+class StageFolder:
+    """What one stage keeps."""
+
+    path: Path
+    stage: Stage
+
+    def config(self, asked: Any = None, iterations: int | None = None) -> Any:
+        """The stage's parameters: those asked for, else those it was begun with, else its defaults; keys that an
+        older file lacks have their defaults. iterations: in all; None for what it was begun with. Raises
+        InputError where others were asked for than it was begun with."""
+        default = asked if asked is not None else self.stage.config()
+        stored = self._stored()
+        if stored is None:
+            config = default
+        else:
+            config = filled(default, stored) if asked is None else default
+            apart = differences(plain(filled(self.stage.config(), stored)), plain(config))
+            if apart:
+                raise InputError(f"holds another run: {apart[0]}", self.path, "out")
+            config = replace(config, iterations=stored["iterations"])
+        return config if iterations is None else replace(config, iterations=iterations)
+
+    def _stored(self) -> dict[str, Any] | None:
+        path = self.path / CONFIG
+        if not path.exists():
+            return None
+        with said_if_damaged(path, "put it right, or learn again", "out"):
+            config = json.loads(path.read_text(encoding="utf-8"))
+            if type(config["iterations"]) is not int:
+                raise ValueError("iterations is no whole number")
+            return dict(config)
+
+    def begin(self, config: Any) -> None:
+        """Make the folder, and keep the parameters."""
+        self.path.mkdir(exist_ok=True)
+        sweep(self.path)
+        write_json(self.path / CONFIG, plain(config))
+
+    def restore(self, learner: Learner) -> float:
+        """Bring a learner to where the checkpoint has it; the seconds that this took when it was learned."""
+        path = self.path / CHECKPOINT
+        if not path.exists():
+            return 0.0
+        remedy = "delete it to learn from the start"
+        state = read_arrays(path, remedy, "out")
+        with said_if_damaged(path, remedy, "out"):
+            seconds = float(state.pop(SECONDS))
+            learner.restore(state)
+        return seconds
+
+    def save(self, state: Arrays, seconds: float) -> None:
+        """Write the checkpoint."""
+        write_arrays(self.path / CHECKPOINT, state | {SECONDS: np.array(seconds)})
+
+    def save_result(self, result: Arrays, iteration: int) -> None:
+        write_arrays(self.path / RESULT, result | {"iteration": np.array(iteration)})
+
+    def log(self, names: list[str], done: int) -> Log:
+        """names: the columns; the first is the iteration, the last the time [s]. done: iterations that
+        count."""
+        return Log(self.path, names, done)
+
+
+RESULT_REMEDY = "delete it and learn on (more iterations): a check writes it anew"
+
+
+def read_result(folder: Path) -> Arrays:
+    """The best that a stage has found so far. Raises InputError where there is none yet."""
+    path = folder / RESULT
+    if not path.exists():
+        reason = "has no policy yet: let it go on with the same warpdribble learn"
+        raise InputError(reason, folder.parent)
+    return read_arrays(path, RESULT_REMEDY)
+
+
+def _starts(arrays: Arrays) -> Starts:
+    return Starts(*(arrays[f"states.{f.name}"] for f in fields(Starts)))
 
 
 def shipped_controllers() -> list[str]:
@@ -213,8 +250,26 @@ def shipped_controllers() -> list[str]:
     return sorted(path.name for path in asset(CONTROLLERS).iterdir() if path.is_dir())
 
 
-def differences(there: dict, here: dict) -> list[str]:
-    """In which keys two configurations differ, beyond those that may."""
+def plain(config: Any) -> dict[str, Any]:
+    """A dataclass as JSON has it."""
+    return dict(json.loads(json.dumps(asdict(config))))
+
+
+def filled(default: Any, stored: Mapping[str, Any]) -> Any:
+    """A dataclass like `default` with the values of a stored table; what the table lacks keeps its default.
+    Raises TypeError for keys that are none."""
+    known = {f.name for f in fields(default)}
+    if unknown := set(stored) - known:
+        raise TypeError(f"unknown key '{sorted(unknown)[0]}'")
+    values = {
+        name: filled(getattr(default, name), value) if is_dataclass(getattr(default, name)) else value
+        for name, value in stored.items()
+    }
+    return replace(default, **values)
+
+
+def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """In which keys two tables differ, beyond those that may."""
     a, b = _flat(there), _flat(here)
     return [
         f"{key} is {_shown(a, key)} there and {_shown(b, key)} here"
@@ -223,52 +278,36 @@ def differences(there: dict, here: dict) -> list[str]:
     ]
 
 
-def _flat(config: dict, above: str = "") -> dict:
-    flat = {}
+def _flat(config: Mapping[str, Any], above: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
     for key, value in config.items():
         flat |= _flat(value, f"{above}{key}.") if isinstance(value, dict) else {above + key: value}
     return flat
 
 
-def _shown(flat: dict, key: str) -> str:
+def _shown(flat: Mapping[str, Any], key: str) -> str:
     text = json.dumps(flat[key]) if key in flat else "missing"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _stored(folder: Path) -> dict | None:
-    """The configuration of the run in a folder; None for a folder that is free. Raises ValueError."""
+def _stored(folder: Path) -> dict[str, Any] | None:
+    """The info of the run in a folder; None for a folder that is free. Raises InputError."""
     if folder.exists() and not folder.is_dir():
-        raise ValueError(f"{folder} is a file; give a folder as --out")
-    if (folder / CONFIG).exists():
-        return _read_config(folder)
-    others = [p.name for p in folder.iterdir() if not p.name.startswith(PART)] if folder.exists() else []
+        raise InputError("is a file, not a folder", folder, "out")
+    if (folder / RUN).exists():
+        return _read_info(folder)
+    names = sorted(p.name for p in folder.iterdir()) if folder.exists() else []
+    others = [name for name in names if not name.startswith(PART) and name != LOCK]
+    if CONFIG in others and GRAPH in others:
+        raise InputError("holds a run of an older version, which cannot go on", folder, "out")
     if others:
-        raise ValueError(f"{folder} is not empty and holds no run ({sorted(others)[0]}); give another --out")
+        raise InputError(f"is not empty and holds no run ({others[0]})", folder, "out")
     return None
 
 
-def _read_config(folder: Path) -> dict:
-    path = folder / CONFIG
-    with said_if_damaged(path, "put it right, or learn again with another --out"):
-        config = json.loads(path.read_text(encoding="utf-8"))
-        for table, key in (("skill", "name"), ("samcon", "iterations"), ("samcon", "check_every")):
-            config[table][key]
-        if type(config["samcon"]["iterations"]) is not int:
-            raise ValueError("samcon.iterations is no whole number")
-    return config
-
-
-def _read_graph(path: Path) -> ControlGraph:
-    with said_if_damaged(path, "learn again with another --out"):
-        return ControlGraph.load(path)
-
-
-def _check_writable(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise ValueError(
-            f"{folder} cannot be written: {error.strerror or error}; give another --out"
-        ) from None
+def _read_info(folder: Path) -> dict[str, Any]:
+    path = folder / RUN
+    with said_if_damaged(path, "put it right, or learn again", "out"):
+        info = json.loads(path.read_text(encoding="utf-8"))
+        info["skill"]["name"], int(info["seed"])
+        return dict(info)

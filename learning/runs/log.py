@@ -7,8 +7,10 @@ import math
 import os
 import time
 from pathlib import Path
+from typing import Any
 
-from .files import whole
+from ...sims.errors import InputError
+from ...sims.files import whole
 
 TABLE, EVENTS = "progress.csv", "tensorboard"
 
@@ -22,7 +24,7 @@ class Log:
         path = folder / TABLE
         rows = [row for row in read_rows(folder) if row[names[0]] <= done]
         if rows and list(rows[0]) != names:
-            raise ValueError(f"{path}: has other columns, by another version; give another --out")
+            raise InputError("has other columns, by another version", path, "out")
         with whole(path) as part, open(part, "w", newline="") as file:
             table = csv.writer(file)
             table.writerow(names)
@@ -68,7 +70,7 @@ def read_rows(folder: str | Path) -> list[dict[str, float]]:
     return read
 
 
-def _event_writer(folder: Path, rows: list[dict[str, float]], names: list[str]):
+def _event_writer(folder: Path, rows: list[dict[str, float]], names: list[str]) -> Any:
     """A new event file with the rows so far, in place of those that are there; None where TensorBoard's
     package is missing.
 
@@ -91,7 +93,7 @@ def _event_writer(folder: Path, rows: list[dict[str, float]], names: list[str]):
     return writer
 
 
-def _add_event(writer, row: dict[str, float], names: list[str], when: float) -> None:
+def _add_event(writer: Any, row: dict[str, float], names: list[str], when: float) -> None:
     """when: [s] since 1970"""
     from tensorboard.compat.proto.event_pb2 import Event
     from tensorboard.compat.proto.summary_pb2 import Summary

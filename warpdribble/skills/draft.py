@@ -9,10 +9,10 @@ from ..clips.data import data_folder
 from ..clips.read import read_clip
 from ..sims import Model
 from ..sims.ball.ball import inferred_ball, recorded_ball
+from ..sims.files import whole as whole_file
 from ..sims.retarget.cycles import find_cycles
 from ..sims.retarget.mapping import find_mapping, read_mapping
 from ..sims.retarget.retarget import retargeted
-from ..takes.take import written_whole
 
 GOOD = 0.06
 """[m] of pose gap up to which a cycle is proposed unasked."""
@@ -70,8 +70,8 @@ def write_draft(path: Path, text: str) -> None:
     if path.suffix.lower() != ".toml":
         raise ValueError(f"{path}: a skill is a .toml file")
     path.parent.mkdir(parents=True, exist_ok=True)
-    with written_whole(path) as part:
-        Path(part).write_text(text, encoding="utf-8")
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def _relative(clip: Path) -> str:

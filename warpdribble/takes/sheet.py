@@ -12,7 +12,9 @@ from matplotlib.patches import Circle, Polygon
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from .take import Take, TakeError, check_writable, written_whole
+from ..sims.files import whole
+from ..sims.signals import runs
+from .take import Take, TakeError, check_writable
 
 POSES = 8
 SPACING = 1.05
@@ -53,7 +55,7 @@ def save(figure: Figure, title: str, path: Path) -> Path:
     """Write a figure under its title; the file appears whole or not at all. Raises TakeError."""
     figure.suptitle(title, fontsize=12, color=INK, x=0.01, ha="left")
     try:
-        with written_whole(path) as part:
+        with whole(path) as part:
             figure.savefig(part)
     except OSError as error:
         raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
@@ -140,8 +142,7 @@ def _draw_strips(axes, contacts: dict[str, np.ndarray], times) -> None:
     """One row per contact, a bar wherever it holds."""
     step = times[1] - times[0] if len(times) > 1 else 1.0
     for row, on in enumerate(contacts.values()):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(on, int), [0]])))
-        bars = [(times[a] - step / 2, (b - a) * step) for a, b in edges.reshape(-1, 2)]
+        bars = [(times[a] - step / 2, (b + 1 - a) * step) for a, b in runs(on)]
         axes.broken_barh(bars, (row - 0.34, 0.68), color=INK)
     axes.set_yticks(range(len(contacts)), list(contacts), fontsize=9)
     axes.set_ylim(len(contacts) - 0.4, -0.6)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -18,6 +17,7 @@ from typing import Literal
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdUtils
 
+from ..sims.files import check_folder, whole
 from . import crowd, figure, scene
 
 SUFFIXES = (".usda", ".usdc", ".usdz")
@@ -96,9 +96,7 @@ def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Pa
     try:
         if path.is_dir():
             raise TakeError(path, "is a folder; give a file name")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
-            pass
+        check_folder(path.parent)
         with contextlib.suppress(FileNotFoundError):
             os.lstat(path)  # says whether the name is too long, or none
     except (OSError, ValueError) as error:
@@ -106,21 +104,6 @@ def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Pa
             raise
         raise TakeError(path, f"cannot be written: {getattr(error, 'strerror', None) or error}") from None
     return path
-
-
-@contextlib.contextmanager
-def written_whole(path: Path):
-    """A temporary name beside `path` to write to: moved to `path` at the end, removed when anything fails.
-
-    Files that a writer leaves beside the temporary name are moved along, first.
-    """
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as folder:
-        part = Path(folder) / path.name
-        yield part
-        for other in sorted(Path(folder).iterdir()):
-            if other != part:
-                os.replace(other, path.parent / other.name)
-        os.replace(part, path)
 
 
 def write_take(
@@ -146,7 +129,7 @@ def write_take(
     if skin and take.model is None:
         raise TakeError(path, "a skin needs the take's model")
     try:
-        with written_whole(path) as part:
+        with whole(path) as part:
             layer = part.with_suffix(".usdc") if path.suffix == ".usdz" else part
             _write(layer, take, skin, joints, layered, spacing)
             if path.suffix == ".usdz":

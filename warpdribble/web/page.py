@@ -15,9 +15,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..sims.files import whole
+from ..sims.signals import runs
 from ..skin import meshes
 from ..takes import crowd, figure, scene
-from ..takes.take import Take, TakeError, check_writable, written_whole
+from ..takes.take import Take, TakeError, check_writable
 
 MOST_WORLDS = 64
 """Worlds that are shown at most, the first ones of a take."""
@@ -71,7 +73,7 @@ def write_replay(
     pieces = page.split("@")
     text = "".join(parts.get(piece, piece) for piece in pieces)
     try:
-        with written_whole(path) as part:
+        with whole(path) as part:
             part.write_text(text, encoding="utf-8")
     except OSError as error:
         raise TakeError(path, f"cannot be written: {error.strerror or error}") from None
@@ -110,8 +112,7 @@ def _describe(take: Take, contacts, title, skin, spacing, start, blocks: Blocks)
 
 def _spans(on, fps: float) -> list[list[float]]:
     """Begin and end [s] of each run of frames in which something holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(on, int), [0]]))).reshape(-1, 2)
-    return np.round(edges / fps, 4).tolist()
+    return [[round(first / fps, 4), round((last + 1) / fps, 4)] for first, last in runs(on)]
 
 
 def _steps(values: np.ndarray) -> tuple[list, np.ndarray, list]:
