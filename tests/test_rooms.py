@@ -33,9 +33,6 @@ NOT_THEIRS = {
 """Other packages that have no business there: file formats, pictures, the command line."""
 
 KNOWN = {
-    ("sims.ball.ball", "sims.retarget.planting"),
-    ("sims.ball.contact_score", "sims.retarget.planting"),
-    ("sims.ball.possession", "sims.retarget.planting"),
     ("takes.skel", "takes.figure"),
 }
 """(who, whom): imports that break the law and are to go. Nothing is ever added here."""

@@ -41,7 +41,7 @@ FLOOR, HEIGHT, GAP = 0.84, 0.44, 0.24
 """[in] from floor to floor, of a room, between two rooms."""
 BEND, LEAN = 0.34, 0.12
 """[in] that an arrow has for its way past a floor's rooms, and that it may lean there."""
-LETTER, LEAST = 0.082, 0.75
+LETTER, LEAST = 0.075, 0.8
 """[in] of a letter's width, of a room's."""
 APART = 0.22
 """[in] between the ends of two arrows at a room."""
