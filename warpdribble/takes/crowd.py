@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, Vt
 
@@ -9,12 +11,17 @@ from . import figure
 from .names import prim_names
 from .scene import PROTOTYPE
 
+if TYPE_CHECKING:
+    from .take import Take
+
 MOST_REFERENCES = 4
 """Worlds up to this number are prims of their own, which can be edited and simulated again."""
 INSTANCER = "/World/Crowd"
 
 
-def add(stage, take, edit: dict, skin: bool, joints: str, spacing: float) -> np.ndarray:
+def add(
+    stage: Usd.Stage, take: Take, edit: dict[str, Usd.EditTarget], skin: bool, joints: str, spacing: float
+) -> np.ndarray:
     """All worlds of a take; where their bodies are drawn, (worlds, frames, bodies, 7)."""
     places = np.array(take.worlds, float)
     offsets = layout(len(places), spacing)
@@ -35,7 +42,14 @@ def layout(count: int, spacing: float) -> np.ndarray:
     return offsets
 
 
-def _references(stage, take, offsets, edit, skin, joints) -> None:
+def _references(
+    stage: Usd.Stage,
+    take: Take,
+    offsets: np.ndarray,
+    edit: dict[str, Usd.EditTarget],
+    skin: bool,
+    joints: str,
+) -> None:
     """A class prim holds player, ball and physics once; each world refers to it and moves."""
     paths = figure.add(stage, PROTOTYPE, take.world(0), edit, skin, joints, moving=False)
     for target in edit.values():
@@ -50,13 +64,13 @@ def _references(stage, take, offsets, edit, skin, joints) -> None:
         xform.AddTranslateOp().Set(Gf.Vec3d(*offset.tolist()))
         moved = [p and p.replace(PROTOTYPE, path) for p in (paths.get(n) for n in take.body_names)]
         figure.animate(edit["animation"].GetLayer(), take.worlds[world], moved)
-        if skin:
+        if skin and take.model is not None:
             from . import skel
 
-            skel.animate(edit["animation"].GetLayer(), f"{path}/Player", take.world(world))
+            skel.animate(edit["animation"].GetLayer(), f"{path}/Player", take.model, take.worlds[world])
 
 
-def _instances(stage, take, places, edit) -> None:
+def _instances(stage: Usd.Stage, take: Take, places: np.ndarray, edit: dict[str, Usd.EditTarget]) -> None:
     """One PointInstancer: a prototype per body, an instance per body and world, without physics."""
     stage.SetEditTarget(edit["scene"])
     instancer = UsdGeom.PointInstancer.Define(stage, INSTANCER)

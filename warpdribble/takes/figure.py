@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pxr import Kind, Sdf, Usd, UsdGeom, Vt
 
+from ..sims.model import Shape
 from ..sims.signals import continuous
 from ..skin import meshes
+from ..skin.flesh import Vector
 from . import scene, usdphysics
 from .names import prim_names
+
+if TYPE_CHECKING:
+    from .take import Take
 
 SEAM_COLOUR = (0.05, 0.04, 0.04)
 
 
-def add(stage, base: str, take, edit: dict, skin: bool, joints: str, moving: bool = True) -> dict[str, str]:
+def add(
+    stage: Usd.Stage,
+    base: str,
+    take: Take,
+    edit: dict[str, Usd.EditTarget],
+    skin: bool,
+    joints: str,
+    moving: bool = True,
+) -> dict[str, str]:
     """Player, ball, physics and, where asked for, the skin below `base`; the bodies' paths by name.
 
     edit: the edit targets "scene", "physics" and "animation". take: of one world.
@@ -34,28 +49,29 @@ def add(stage, base: str, take, edit: dict, skin: bool, joints: str, moving: boo
         add_visuals(stage, path, own, seams=name == take.ball)
     if take.model is not None:
         stage.SetEditTarget(edit["physics"])
-        usdphysics.add(stage, base, take, paths, joints)
-    if skin:
+        usdphysics.add(stage, base, take.model, take.worlds[0, 0], paths, joints)
+    if skin and take.model is not None:
         from . import skel
 
         stage.SetEditTarget(edit["scene"])
-        skel.add(stage, f"{base}/Player", take, edit["animation"] if moving else None)
+        player, animation = f"{base}/Player", edit["animation"] if moving else None
+        skel.add(stage, player, take.model, take.worlds[0], animation)
     if moving:
         animate(edit["animation"].GetLayer(), take.worlds[0], [paths.get(n) for n in take.body_names])
     return paths
 
 
-def add_static(stage, take, edit: dict) -> None:
+def add_static(stage: Usd.Stage, take: Take, edit: dict[str, Usd.EditTarget]) -> None:
     """What belongs to the world: seen below `/World/Court`, and to collide with."""
     shapes = [s for s in take.shapes if s.body < 0]
     if seen := [s for s in shapes if s.kind != "plane"]:
         add_visuals(stage, "/World/Court", seen, seams=False, name="fixed")
     if take.model is not None:
         stage.SetEditTarget(edit["physics"])
-        usdphysics.add_world(stage, take, shapes)
+        usdphysics.add_world(stage, take.model, shapes)
 
 
-def body_paths(take, base: str) -> dict[str, str]:
+def body_paths(take: Take, base: str) -> dict[str, str]:
     """Prim path by body name. Bodies without a shape are left out where there is no physics to need them."""
     shown = {s.body for s in take.shapes}
     names = [n for i, n in enumerate(take.body_names) if i in shown or take.model is not None]
@@ -63,7 +79,7 @@ def body_paths(take, base: str) -> dict[str, str]:
     return {n: f"{base}/Ball" if n == take.ball else f"{base}/Player/{legal[n]}" for n in names}
 
 
-def add_visuals(stage, parent: str, shapes: list, seams: bool, name: str = "") -> None:
+def add_visuals(stage: Usd.Stage, parent: str, shapes: list[Shape], seams: bool, name: str = "") -> None:
     """One mesh per colour of a body's shapes, named `<body>_visual`, `<body>_visual_2`, ...
 
     Blender merges an Xform with its only mesh and keeps the mesh's name. Seams are a mesh of their own:
@@ -74,7 +90,7 @@ def add_visuals(stage, parent: str, shapes: list, seams: bool, name: str = "") -
         scene.add_mesh(stage, f"{parent}/{name}_visual" + (f"_{number}" if number > 1 else ""), part, colour)
 
 
-def coloured(shapes: list, seams: bool) -> list[tuple[meshes.Mesh, tuple]]:
+def coloured(shapes: list[Shape], seams: bool) -> list[tuple[meshes.Mesh, Vector]]:
     """A body's shapes as one mesh per colour; those that are fully transparent are left out."""
     shapes = [s for s in shapes if s.rgba[3] > 0.0]
     parts = []
@@ -88,8 +104,9 @@ def coloured(shapes: list, seams: bool) -> list[tuple[meshes.Mesh, tuple]]:
     return parts
 
 
-def _colour(shape) -> tuple[float, ...]:
-    return tuple(np.round(np.asarray(shape.rgba[:3], float), 4).tolist())
+def _colour(shape: Shape) -> Vector:
+    r, g, b = np.round(np.asarray(shape.rgba[:3], float), 4).tolist()
+    return r, g, b
 
 
 def animate(layer: Sdf.Layer, body_q: np.ndarray, paths: list[str | None]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .sheet import INK, RIGHT_COLOUR, save
@@ -42,7 +43,7 @@ def write_plots(
     return save(figure, title, path)
 
 
-def _draw_path(axes, root, wanted) -> None:
+def _draw_path(axes: Axes, root: np.ndarray, wanted: np.ndarray) -> None:
     """Seen from above; never less than half a metre across, so that standing looks like standing."""
     axes.plot(*wanted[:, :2].T, color=REFERENCE_COLOUR, linewidth=3.0, label="reference")
     axes.plot(*root[:, :2].T, color=RIGHT_COLOUR, linewidth=1.4, label="simulated")
@@ -59,7 +60,9 @@ def _draw_path(axes, root, wanted) -> None:
     _plain(axes)
 
 
-def _draw_error(axes, times, error, label: str, fallen) -> None:
+def _draw_error(
+    axes: Axes, times: np.ndarray, error: np.ndarray, label: str, fallen: np.ndarray | None
+) -> None:
     axes.plot(times, error, color=RIGHT_COLOUR, linewidth=1.3)
     mean = float(np.mean(error))
     axes.axhline(mean, color=REFERENCE_COLOUR, linewidth=1.0, zorder=0)
@@ -98,6 +101,6 @@ def _draw_error(axes, times, error, label: str, fallen) -> None:
     _plain(axes)
 
 
-def _plain(axes) -> None:
+def _plain(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(colors=INK)

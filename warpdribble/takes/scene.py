@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdLux, UsdShade, Vt
 
+from ..skin.flesh import Vector
 from ..skin.meshes import Mesh, merge, weld
 
 COURT_COLOUR = (0.62, 0.45, 0.27)
@@ -12,6 +13,7 @@ LINE_COLOUR = (0.93, 0.90, 0.84)
 COURT_HALF = (14.0, 7.5)
 """[m] half length and half width of a regulation court."""
 LINE_WIDTH = 0.05
+Point = tuple[float, float] | np.ndarray
 PROTOTYPE = "/World/Prototype"
 """What several worlds of a take refer to."""
 
@@ -30,7 +32,7 @@ def set_metadata(layer: Sdf.Layer, frames: int, fps: float) -> None:
     layer.defaultPrim = "World"
 
 
-def define_world(stage) -> None:
+def define_world(stage: Usd.Stage) -> None:
     world = UsdGeom.Xform.Define(stage, "/World").GetPrim()
     Usd.ModelAPI(world).SetKind(Kind.Tokens.assembly)
 
@@ -41,7 +43,7 @@ def home(path: str) -> str:
     return PROTOTYPE if path.startswith(PROTOTYPE + "/") else "/World"
 
 
-def material(stage, colour, where: str) -> UsdShade.Material:
+def material(stage: Usd.Stage, colour: Vector, where: str) -> UsdShade.Material:
     """The preview surface of a colour, made once below `where`."""
     name = "colour_" + "_".join(f"{round(255 * c):03d}" for c in colour[:3])
     path = f"{where}/Materials/{name}"
@@ -58,8 +60,8 @@ def material(stage, colour, where: str) -> UsdShade.Material:
     return surface
 
 
-def add_mesh(stage, path: str, mesh: Mesh, colour) -> UsdGeom.Mesh:
-    """A mesh prim with normals, extent, displayColor and a bound material. colour: 3 numbers in 0 to 1; None
+def add_mesh(stage: Usd.Stage, path: str, mesh: Mesh, colour: Vector | None) -> UsdGeom.Mesh:
+    """A mesh prim with normals, extent, displayColor and a bound material. colour: numbers in 0 to 1; None
     leaves both to the caller. Points in one place become one; where their normals differ, corners keep
     them."""
     prim = UsdGeom.Mesh.Define(stage, path)
@@ -81,7 +83,7 @@ def add_mesh(stage, path: str, mesh: Mesh, colour) -> UsdGeom.Mesh:
     return prim
 
 
-def add_surroundings(stage, path_of_bodies: np.ndarray) -> None:
+def add_surroundings(stage: Usd.Stage, path_of_bodies: np.ndarray) -> None:
     """Court, lights, and a camera that sees every position in path_of_bodies (n, 3) [m]."""
     UsdGeom.Xform.Define(stage, "/World/Court")
     for name, (mesh, colour) in zip(
@@ -99,13 +101,13 @@ def add_surroundings(stage, path_of_bodies: np.ndarray) -> None:
     _add_camera(stage, path_of_bodies)
 
 
-def court(reach: float) -> list[tuple[Mesh, tuple]]:
+def court(reach: float) -> list[tuple[Mesh, Vector]]:
     """Floor and lines with their colours; the floor goes on to `reach` [m] from the origin, or further."""
     half = np.maximum(COURT_HALF, reach)
     return [(_slab(-half, half, -0.06, -0.004), COURT_COLOUR), (_lines(), LINE_COLOUR)]
 
 
-def _add_camera(stage, path_of_bodies: np.ndarray) -> None:
+def _add_camera(stage: Usd.Stage, path_of_bodies: np.ndarray) -> None:
     low, high = path_of_bodies.min(axis=0), path_of_bodies.max(axis=0)
     centre = 0.5 * (low + high)
     centre[2] = 0.9
@@ -126,11 +128,14 @@ def _add_camera(stage, path_of_bodies: np.ndarray) -> None:
     camera.CreateFocusDistanceAttr(distance)
 
 
-def _slab(low, high, bottom: float, top: float) -> Mesh:
-    """A box with flat faces: an importer that wants volume finds one."""
+def _slab(low: Point, high: Point, bottom: float, top: float) -> Mesh:
+    """A box with flat faces between two points over the ground (2,) [m] and two heights: an importer that
+    wants volume finds one."""
     corners = np.array(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij")).reshape(3, -1).T
     ends = np.array([[*low, bottom], [*high, top]], float)
-    points, normals, faces = [], [], []
+    points: list[np.ndarray] = []
+    normals: list[np.ndarray] = []
+    faces: list[list[int]] = []
     for axis in range(3):
         for side in (0, 1):
             four = ends[corners[corners[:, axis] == side], np.arange(3)]

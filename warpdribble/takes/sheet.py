@@ -6,13 +6,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Polygon
+from matplotlib.patches import Circle, Patch, Polygon
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from ..sims.files import whole
+from ..sims.model import Shape
 from ..sims.signals import runs
 from .take import Take, TakeError, check_writable
 
@@ -21,6 +23,8 @@ SPACING = 1.05
 """[m] between neighbouring poses."""
 VIEW = (-50.0, 0.0)
 """[deg] where the viewer stands: about the vertical from +X, and above the horizon."""
+Outline = tuple[np.ndarray, float] | np.ndarray
+"""Centre (2,) and radius, or points (n, 2) [m]."""
 INK = "#30363d"
 BALL_COLOUR, RIGHT_COLOUR, LEFT_COLOUR = "#d9662b", "#1f6fb4", "#5a9367"
 
@@ -62,7 +66,7 @@ def save(figure: Figure, title: str, path: Path) -> Path:
     return path
 
 
-def _draw_poses(axes, take: Take, frames, times) -> None:
+def _draw_poses(axes: Axes, take: Take, frames: np.ndarray, times: np.ndarray) -> None:
     """Poses side by side, each seen from the same direction, far shapes first and paler."""
     turn = np.radians(VIEW)
     right = np.array([-np.sin(turn[0]), np.cos(turn[0]), 0.0])
@@ -94,9 +98,10 @@ def _draw_poses(axes, take: Take, frames, times) -> None:
     axes.axis("off")
 
 
-def _outline(shape, body_q, screen, middle):
-    """Depth, outline (points (n, 2) or (centre, radius)) and colour of a shape as the viewer
-    sees it."""
+def _outline(
+    shape: Shape, body_q: np.ndarray, screen: np.ndarray, middle: np.ndarray
+) -> tuple[float, Outline, np.ndarray]:
+    """Depth, outline and colour of a shape as the viewer sees it."""
     body = Rotation.from_quat(body_q[shape.body, 3:])
     turn = body * Rotation.from_quat(shape.quat)
     centre = body_q[shape.body, :3] + body.apply(shape.pos) - middle
@@ -114,7 +119,7 @@ def _outline(shape, body_q, screen, middle):
     return seen[2], points[ConvexHull(points).vertices], shape.rgba
 
 
-def _patch(outline, shift: float):
+def _patch(outline: Outline, shift: float) -> Patch:
     aside = np.array([shift, 0.0])
     if isinstance(outline, tuple):
         centre, radius = outline
@@ -122,7 +127,9 @@ def _patch(outline, shift: float):
     return Polygon(outline + aside)
 
 
-def _draw_heights(axes, take: Take, hands, times, frames) -> None:
+def _draw_heights(
+    axes: Axes, take: Take, hands: dict[str, np.ndarray], times: np.ndarray, frames: np.ndarray
+) -> None:
     if take.ball in take.body_names:
         ball = take.body_q[:, take.body_names.index(take.ball), 2]
         axes.plot(times, ball, color=BALL_COLOUR, linewidth=1.8, label="ball")
@@ -138,7 +145,7 @@ def _draw_heights(axes, take: Take, hands, times, frames) -> None:
     axes.tick_params(labelbottom=False, colors=INK)
 
 
-def _draw_strips(axes, contacts: dict[str, np.ndarray], times) -> None:
+def _draw_strips(axes: Axes, contacts: dict[str, np.ndarray], times: np.ndarray) -> None:
     """One row per contact, a bar wherever it holds."""
     step = times[1] - times[0] if len(times) > 1 else 1.0
     for row, on in enumerate(contacts.values()):

@@ -7,16 +7,23 @@ import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 from scipy.spatial.transform import Rotation
 
+from ..sims.model import Model
 from ..skin import flesh, skin
 from . import figure
 from .names import prim_name, prim_names
 from .scene import add_mesh, home, material
 
 
-def add(stage, player: str, take, animation=None) -> None:
-    """The skin below `player`/Skin, in the stage's edit target; moving where an edit target `animation` is
-    given."""
-    model, built = take.model, skin.of(take.model)
+def add(
+    stage: Usd.Stage,
+    player: str,
+    model: Model,
+    body_q: np.ndarray,
+    animation: Usd.EditTarget | None = None,
+) -> None:
+    """The skin below `player`/Skin, in the stage's edit target; moving as body_q (frames, nbody, 7) where an
+    edit target `animation` is given."""
+    built = skin.of(model)
     root = UsdSkel.Root.Define(stage, f"{player}/Skin")
     Usd.ModelAPI(root.GetPrim()).SetKind(Kind.Tokens.subcomponent)
     skeleton = UsdSkel.Skeleton.Define(stage, f"{player}/Skin/Skeleton")
@@ -42,13 +49,14 @@ def add(stage, player: str, take, animation=None) -> None:
     )
     UsdSkel.Animation.Define(stage, f"{player}/Skin/Animation")
     if animation is not None:
-        animate(animation.GetLayer(), player, take)
+        animate(animation.GetLayer(), player, model, body_q)
 
 
-def animate(layer: Sdf.Layer, player: str, take) -> None:
-    """Local translations and rotations of all joints: default = frame 0, and a sample per frame."""
-    bodies, joints = joint_paths(take.model)
-    local = local_poses(take.model, np.asarray(take.worlds[0], float), bodies)
+def animate(layer: Sdf.Layer, player: str, model: Model, body_q: np.ndarray) -> None:
+    """Local translations and rotations of all joints: default = frame 0, and a sample per frame of body_q
+    (frames, nbody, 7)."""
+    bodies, joints = joint_paths(model)
+    local = local_poses(model, np.asarray(body_q, float), bodies)
     places = np.ascontiguousarray(local[..., :3], np.float32)
     turns = np.ascontiguousarray(figure.continuous_quaternions(local[..., 3:]), np.float32)
     with Sdf.ChangeBlock():
@@ -68,7 +76,7 @@ def animate(layer: Sdf.Layer, player: str, take) -> None:
                     layer.SetTimeSample(attribute.path, float(frame), pack.FromNumpy(value))
 
 
-def joint_paths(model) -> tuple[list[int], list[str]]:
+def joint_paths(model: Model) -> tuple[list[int], list[str]]:
     """Bodies that a skin may follow, all but the ball's, and their paths in the skeleton."""
     balls = flesh.ball_bodies(model)
     bodies = [b for b in range(model.nbody) if b not in balls]
@@ -81,7 +89,7 @@ def joint_paths(model) -> tuple[list[int], list[str]]:
     return bodies, [paths[b] for b in bodies]
 
 
-def local_poses(model, body_q: np.ndarray, bodies: list[int]) -> np.ndarray:
+def local_poses(model: Model, body_q: np.ndarray, bodies: list[int]) -> np.ndarray:
     """(frames, joints, 7) of each body in its parent's frame, from body_q (frames, nbody, 7) in the world."""
     local = np.array(body_q[:, bodies], float)
     for joint, b in enumerate(bodies):
@@ -101,7 +109,7 @@ def _matrices(poses: np.ndarray) -> Vt.Matrix4dArray:
     return Vt.Matrix4dArray([Gf.Matrix4d(m.tolist()) for m in matrices])
 
 
-def _paint(stage, mesh: UsdGeom.Mesh, built: skin.Skin) -> None:
+def _paint(stage: Usd.Stage, mesh: UsdGeom.Mesh, built: skin.Skin) -> None:
     """A subset of faces and a material per region, that together cover the mesh, and a colour per face."""
     for number, region in enumerate(built.regions):
         faces = np.flatnonzero(built.region == number).astype(np.int32)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -18,6 +18,7 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 from ..sims.files import check_folder, whole
+from ..sims.model import Model, Shape
 from . import crowd, figure, scene
 
 SUFFIXES = (".usda", ".usdc", ".usdz")
@@ -28,7 +29,7 @@ LAYERS = {"animation": "usdc", "physics": "usda", "scene": "usdc"}
 class TakeError(ValueError):
     """A take that cannot be written; the message is one line with the file and the reason."""
 
-    def __init__(self, path: str | Path, reason: str):
+    def __init__(self, path: str | Path, reason: str) -> None:
         super().__init__(f"{path}: {reason}")
 
 
@@ -37,9 +38,8 @@ class Take:
     """Bodies and shapes over time, from plain arrays."""
 
     body_names: list[str]
-    shapes: list
-    """Objects with name, body (int, -1 = world), kind, size, pos, quat xyzw and rgba, as
-    `sims.Model.shapes`."""
+    shapes: list[Shape]
+    """As `sims.Model.shapes`."""
     body_q: np.ndarray
     """(frames, bodies, 7) or (worlds, frames, bodies, 7) [m, -], position and quaternion xyzw of each body
     frame in its world."""
@@ -49,10 +49,10 @@ class Take:
     """Name of the body shown as `/World/Ball`; all others belong to `/World/Player`."""
     notes: dict[str, str] = field(default_factory=dict)
     """Where the take comes from; stored as the layer's custom data."""
-    model: object = None
-    """The `sims.Model` that the bodies are of; without it a take has no physics and no skin."""
+    model: Model | None = None
+    """What the bodies are of; without it a take has no physics and no skin."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         shape, count = np.shape(self.body_q), len(self.body_names)
         if len(shape) not in (3, 4) or shape[-2:] != (count, 7):
             raise ValueError(
@@ -71,9 +71,9 @@ class Take:
             raise ValueError("body_names are not those of the model")
 
     @classmethod
-    def of(cls, model, body_q, fps: float, **rest) -> Take:
-        """A take of a `sims.Model`, with its bodies, shapes and physics."""
-        return cls(list(model.body_names), model.shapes, body_q, fps, model=model, **rest)
+    def of(cls, model: Model, body_q: np.ndarray, fps: float, *, notes: dict[str, str] | None = None) -> Take:
+        """A take of a model, with its bodies, shapes and physics."""
+        return cls(list(model.body_names), model.shapes, body_q, fps, notes=notes or {}, model=model)
 
     @property
     def worlds(self) -> np.ndarray:
@@ -82,9 +82,7 @@ class Take:
 
     def world(self, index: int) -> Take:
         """The take of one world alone."""
-        import dataclasses
-
-        return dataclasses.replace(self, body_q=self.worlds[index])
+        return replace(self, body_q=self.worlds[index])
 
 
 def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Path:

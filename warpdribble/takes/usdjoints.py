@@ -16,9 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Sdf, UsdGeom, UsdPhysics
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 
+from ..sims.model import Model
 from .names import prim_names
 
 KINDS = ("revolute", "d6", "spherical")
@@ -26,6 +27,10 @@ PER_DEGREE = np.pi / 180.0
 """[rad] in a degree: a gain per radian times this is the gain per degree."""
 FREE, BALL = 0, 1
 AXES = "XYZ"
+Ends = tuple[str | None, str]
+"""Paths of the bodies that a joint ties: the parent's, None for the world, and the child's."""
+Gains = tuple[float, float, float]
+"""kp [N m/rad], kd [N m s/rad], effort [N m]"""
 
 
 @dataclass(frozen=True)
@@ -46,11 +51,13 @@ class Frame:
 WORLD = Frame(np.zeros(3), Rotation.identity())
 
 
-def add(stage, base: str, take, paths: dict[str, str], kind: str) -> None:
-    """Every joint of the model below `base`/Player/Joints. Drives hold the pose of frame 0."""
+def add(
+    stage: Usd.Stage, base: str, model: Model, body_q: np.ndarray, paths: dict[str, str], kind: str
+) -> None:
+    """Every joint of the model below `base`/Player/Joints. Drives hold the pose body_q (nbody, 7). paths: of
+    the bodies, by name. Raises ValueError for a kind that is none."""
     if kind not in KINDS:
         raise ValueError(f"joints '{kind}': give one of {', '.join(KINDS)}")
-    model, body_q = take.model, take.worlds[0, 0]
     where = f"{base}/Player/Joints"
     legal = prim_names([*model.joint_names, *(f"{name} weld" for name in model.body_names)])
     for body, name in enumerate(model.body_names):
@@ -75,7 +82,7 @@ def add(stage, base: str, take, paths: dict[str, str], kind: str) -> None:
             _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind)
 
 
-def links_of(model, body: int) -> list[int]:
+def links_of(model: Model, body: int) -> list[int]:
     """The links (rows of the model's tables) of a body's joints, from its parent outwards; none when it is
     welded."""
     parent = int(model.body_parent[body])
@@ -87,7 +94,7 @@ def links_of(model, body: int) -> list[int]:
     return links[::-1]
 
 
-def is_static(model, body: int) -> bool:
+def is_static(model: Model, body: int) -> bool:
     """Whether a body is welded to the world."""
     while body >= 0:
         if links_of(model, body):
@@ -96,11 +103,11 @@ def is_static(model, body: int) -> bool:
     return True
 
 
-def _pose(body_q, body: int) -> Frame:
+def _pose(body_q: np.ndarray, body: int) -> Frame:
     return WORLD if body < 0 else Frame(body_q[body, :3], Rotation.from_quat(body_q[body, 3:]))
 
 
-def _in_link(model, body: int) -> Frame:
+def _in_link(model: Model, body: int) -> Frame:
     """A body's frame in that of its last link."""
     if body < 0:
         return WORLD
@@ -108,7 +115,7 @@ def _in_link(model, body: int) -> Frame:
     return Frame(t["body_offset"][body], Rotation.from_quat(t["body_turn"][body]))
 
 
-def _frames(model, parent: int, body: int, links: list[int]):
+def _frames(model: Model, parent: int, body: int, links: list[int]) -> list[tuple[int, Frame, Frame]]:
     """(link, its frame in the parent body, its frame in the body), all joints at zero."""
     t = model.tables
     frame, frames = _in_link(model, parent).inverse(), []
@@ -119,11 +126,22 @@ def _frames(model, parent: int, body: int, links: list[int]):
     return [(link, f, child.inverse() @ f) for link, f in zip(links, frames)]
 
 
-def _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind) -> None:
+def _add_joint(
+    stage: Usd.Stage,
+    path: str,
+    model: Model,
+    link: int,
+    ends: Ends,
+    frame0: Frame,
+    frame1: Frame,
+    turn: Rotation,
+    kind: str,
+) -> None:
     t = model.tables
     dof = int(t["link_dof"][link])
-    gains = float(t["dof_kp"][dof]), float(t["dof_kd"][dof]), float(t["link_effort"][link])
-    gains = gains if t["link_driven"][link] else None
+    gains: Gains | None = None
+    if t["link_driven"][link]:
+        gains = float(t["dof_kp"][dof]), float(t["dof_kd"][dof]), float(t["link_effort"][link])
     limits = (float(t["link_lower"][link]), float(t["link_upper"][link])) if t["link_limited"][link] else None
     armature = float(t["dof_armature"][dof])
     at_start = frame0.R.inv() * turn * frame1.R
@@ -140,7 +158,7 @@ def _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind) -> No
     if kind == "revolute":
         for k, angle in enumerate(euler):
             axis = Rotation.align_vectors([np.eye(3)[k]], [[1.0, 0.0, 0.0]])[0]
-            both = reach and (-reach, reach)
+            both = None if reach is None else (-reach, reach)
             part = f"{path}_{AXES[k].lower()}"
             _revolute(stage, part, ends, frame0, frame1, axis, both, gains, angle)
             _extend(stage.GetPrimAtPath(part), armature)
@@ -150,12 +168,14 @@ def _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind) -> No
     else:
         joint = _joint(stage, UsdPhysics.SphericalJoint, path, ends, frame0, frame1)
         joint.CreateAxisAttr(_bone_axis(model, link))
-        if reach:
+        if reach is not None:
             joint.CreateConeAngle0LimitAttr(min(np.degrees(reach), 179.0))
             joint.CreateConeAngle1LimitAttr(min(np.degrees(reach), 179.0))
 
 
-def _joint(stage, schema, path: str, ends, frame0: Frame, frame1: Frame):
+def _joint(
+    stage: Usd.Stage, schema: type[UsdPhysics.Joint], path: str, ends: Ends, frame0: Frame, frame1: Frame
+) -> UsdPhysics.Joint:
     joint = schema.Define(stage, path)
     if ends[0]:
         joint.CreateBody0Rel().SetTargets([ends[0]])
@@ -167,7 +187,17 @@ def _joint(stage, schema, path: str, ends, frame0: Frame, frame1: Frame):
     return joint
 
 
-def _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle) -> None:
+def _revolute(
+    stage: Usd.Stage,
+    path: str,
+    ends: Ends,
+    frame0: Frame,
+    frame1: Frame,
+    axis: Rotation,
+    limits: tuple[float, float] | None,
+    gains: Gains | None,
+    angle: float,
+) -> None:
     aside = Frame(np.zeros(3), axis)
     joint = _joint(stage, UsdPhysics.RevoluteJoint, path, ends, frame0 @ aside, frame1 @ aside)
     joint.CreateAxisAttr("X")
@@ -177,21 +207,30 @@ def _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle) -> 
     _drive(joint.GetPrim(), "angular", gains, angle)
 
 
-def _d6(stage, path, ends, frame0, frame1, reach, gains, euler) -> None:
+def _d6(
+    stage: Usd.Stage,
+    path: str,
+    ends: Ends,
+    frame0: Frame,
+    frame1: Frame,
+    reach: float | None,
+    gains: Gains | None,
+    euler: np.ndarray,
+) -> None:
     prim = _joint(stage, UsdPhysics.Joint, path, ends, frame0, frame1).GetPrim()
     for k, axis in enumerate(AXES):
         lock = UsdPhysics.LimitAPI.Apply(prim, f"trans{axis}")
         lock.CreateLowAttr(1.0)
         lock.CreateHighAttr(-1.0)
-        if reach:
+        if reach is not None:
             limit = UsdPhysics.LimitAPI.Apply(prim, f"rot{axis}")
             limit.CreateLowAttr(float(-np.degrees(reach)))
             limit.CreateHighAttr(float(np.degrees(reach)))
         _drive(prim, f"rot{axis}", gains, euler[k])
 
 
-def _drive(prim, where: str, gains, angle: float) -> None:
-    """A force drive to `angle` [rad]; gains: kp [N m/rad], kd [N m s/rad], effort [N m]."""
+def _drive(prim: Usd.Prim, where: str, gains: Gains | None, angle: float) -> None:
+    """A force drive to `angle` [rad]."""
     if gains is None:
         return
     drive = UsdPhysics.DriveAPI.Apply(prim, where)
@@ -203,7 +242,7 @@ def _drive(prim, where: str, gains, angle: float) -> None:
     drive.CreateTargetVelocityAttr(0.0)
 
 
-def _extend(prim, armature: float, angle: float | None = None) -> None:
+def _extend(prim: Usd.Prim, armature: float, angle: float | None = None) -> None:
     """What the schema has no word for, in the words of engines: armature [kg m^2], and for MuJoCo the angle
     [rad] at which a hinge starts, without which it would count limits from there."""
     said = {
@@ -217,7 +256,7 @@ def _extend(prim, armature: float, angle: float | None = None) -> None:
         prim.CreateAttribute(name, kind, custom=False).Set(value)
 
 
-def _bone_axis(model, link: int) -> str:
+def _bone_axis(model: Model, link: int) -> str:
     """The axis of a link's frame that its bone runs along: towards the links it carries, or its own mass."""
     t = model.tables
     carried = [t["link_offset"][i] for i in range(1, len(t["link_parent"])) if t["link_parent"][i] == link]

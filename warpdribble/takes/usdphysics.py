@@ -9,30 +9,33 @@ angular drive are per degree, as the schema has it: stiffness in mass x distance
 from __future__ import annotations
 
 import numpy as np
-from pxr import Gf, Sdf, UsdGeom, UsdPhysics, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from scipy.spatial.transform import Rotation
 
+from ..sims.model import Model, Shape
 from . import usdjoints
 from .scene import home
 
 
-def add(stage, base: str, take, paths: dict[str, str], joints: str) -> None:
-    """Bodies, colliders and joints of the model at frame 0 below `base`."""
-    model = take.model
+def add(
+    stage: Usd.Stage, base: str, model: Model, body_q: np.ndarray, paths: dict[str, str], joints: str
+) -> None:
+    """Bodies, colliders and joints of the model below `base`, as they stand in body_q (nbody, 7). paths: of
+    the bodies, by name."""
     colliders = {}
     for body, name in enumerate(model.body_names):
         prim = stage.GetPrimAtPath(paths[name])
         if not usdjoints.is_static(model, body):
             _rigid(prim, model, body)
         colliders[paths[name]] = _colliders(stage, paths[name], [s for s in model.shapes if s.body == body])
-    usdjoints.add(stage, base, take, paths, joints)
+    usdjoints.add(stage, base, model, body_q, paths, joints)
     _filter(stage, colliders)
 
 
-def add_world(stage, take, shapes: list) -> None:
+def add_world(stage: Usd.Stage, model: Model, shapes: list[Shape]) -> None:
     """Gravity, and the colliders of the world's own shapes below `/World/Court`."""
     scene = UsdPhysics.Scene.Define(stage, "/World/PhysicsScene")
-    gravity = np.asarray(take.model.tables["gravity"], float)
+    gravity = np.asarray(model.tables["gravity"], float)
     size = float(np.linalg.norm(gravity))
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else [0.0, 0.0, -1.0])))
     scene.CreateGravityMagnitudeAttr(size)
@@ -48,7 +51,7 @@ def principal(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return moments, Rotation.from_matrix(axes).as_quat()
 
 
-def _rigid(prim, model, body: int) -> None:
+def _rigid(prim: Usd.Prim, model: Model, body: int) -> None:
     UsdPhysics.RigidBodyAPI.Apply(prim)
     mass = UsdPhysics.MassAPI.Apply(prim)
     moments, axes = principal(model.body_inertia[body])
@@ -58,12 +61,12 @@ def _rigid(prim, model, body: int) -> None:
     mass.CreatePrincipalAxesAttr(quatf(axes))
 
 
-def quatf(xyzw) -> Gf.Quatf:
+def quatf(xyzw: np.ndarray) -> Gf.Quatf:
     x, y, z, w = (float(v) for v in xyzw)
     return Gf.Quatf(w, x, y, z)
 
 
-def _colliders(stage, parent: str, shapes: list, name: str = "") -> list[tuple[str, object]]:
+def _colliders(stage: Usd.Stage, parent: str, shapes: list[Shape], name: str = "") -> list[tuple[str, Shape]]:
     """A gprim per colliding shape, `<body>_collider`, `<body>_collider_2`, ..., not rendered; path and shape
     of each."""
     name = name or parent.rpartition("/")[2]
@@ -84,7 +87,7 @@ def _colliders(stage, parent: str, shapes: list, name: str = "") -> list[tuple[s
     return made
 
 
-def _gprim(stage, path: str, shape) -> UsdGeom.Gprim:
+def _gprim(stage: Usd.Stage, path: str, shape: Shape) -> UsdGeom.Gprim:
     """A shape as gprim; a box is a cube of half size 1, to be scaled."""
     if shape.kind == "sphere":
         prim = UsdGeom.Sphere.Define(stage, path)
@@ -111,7 +114,7 @@ def _gprim(stage, path: str, shape) -> UsdGeom.Gprim:
     return prim
 
 
-def _material(stage, where: str, shape) -> UsdShade.Material:
+def _material(stage: Usd.Stage, where: str, shape: Shape) -> UsdShade.Material:
     """A shape's friction and restitution as a material, made once below `where`.
 
     The model multiplies the restitutions of two shapes; PhysX is told so, other engines have rules of their
@@ -137,7 +140,7 @@ def _material(stage, where: str, shape) -> UsdShade.Material:
     return material
 
 
-def _filter(stage, colliders: dict[str, list[tuple[str, object]]]) -> None:
+def _filter(stage: Usd.Stage, colliders: dict[str, list[tuple[str, Shape]]]) -> None:
     """Filtered pairs of what never meets in the model: of bodies where none of their shapes do, else of
     shapes.
 
@@ -159,5 +162,5 @@ def _filter(stage, colliders: dict[str, list[tuple[str, object]]]) -> None:
         )
 
 
-def _meet(a, b) -> bool:
+def _meet(a: Shape, b: Shape) -> bool:
     return bool(a.contype & b.conaffinity or b.contype & a.conaffinity)

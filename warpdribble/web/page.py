@@ -11,13 +11,16 @@ import base64
 import html
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..sims.files import whole
+from ..sims.model import Model
 from ..sims.signals import runs
 from ..skin import meshes
+from ..skin.flesh import Vector
 from ..takes import crowd, figure, scene
 from ..takes.take import Take, TakeError, check_writable
 
@@ -28,10 +31,10 @@ MOST_WORLDS = 64
 class Blocks:
     """Arrays in one run of bytes, each at a multiple of 4."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.data = bytearray()
 
-    def add(self, values: np.ndarray, kind: str) -> dict:
+    def add(self, values: np.ndarray, kind: str) -> dict[str, Any]:
         """Where an array stands: {at, count, kind}. kind: "f4", "u2", "i2", "i1", "u1", "u4"."""
         self.data += b"\0" * (-len(self.data) % 4)
         values = np.ascontiguousarray(values, f"<{kind}").ravel()
@@ -80,7 +83,15 @@ def write_replay(
     return path
 
 
-def _describe(take: Take, contacts, title, skin, spacing, start, blocks: Blocks) -> dict:
+def _describe(
+    take: Take,
+    contacts: dict[str, np.ndarray],
+    title: str,
+    skin: bool,
+    spacing: float,
+    start: float,
+    blocks: Blocks,
+) -> dict[str, Any]:
     worlds = np.asarray(take.worlds[:MOST_WORLDS], float)
     count, frames, bodies = worlds.shape[:3]
     places, turns = worlds[..., :3], np.stack([figure.continuous_quaternions(w[..., 3:]) for w in worlds])
@@ -106,23 +117,23 @@ def _describe(take: Take, contacts, title, skin, spacing, start, blocks: Blocks)
             "turns": blocks.add(np.round(turns * 32767), "i2"),
         },
         "meshes": _meshes(take, skin, float(np.abs(places[..., :2]).max()) + reach, blocks),
-        "skin": _skin(take, blocks) if skin else None,
+        "skin": _skin(take.model, blocks) if skin and take.model is not None else None,
     }
 
 
-def _spans(on, fps: float) -> list[list[float]]:
+def _spans(on: np.ndarray, fps: float) -> list[list[float]]:
     """Begin and end [s] of each run of frames in which something holds."""
     return [[round(first / fps, 4), round((last + 1) / fps, 4)] for first, last in runs(on)]
 
 
-def _steps(values: np.ndarray) -> tuple[list, np.ndarray, list]:
+def _steps(values: np.ndarray) -> tuple[list[float], np.ndarray, list[float]]:
     """values (..., 3) as low (3,), whole numbers from 0 to 65 535, and size (3,)."""
     low = values.reshape(-1, 3).min(axis=0)
     size = np.maximum(values.reshape(-1, 3).max(axis=0) - low, 1e-9)
     return low.tolist(), np.round((values - low) / size * 65535), size.tolist()
 
 
-def _mesh(mesh: meshes.Mesh, colour, blocks: Blocks) -> dict:
+def _mesh(mesh: meshes.Mesh, colour: Vector, blocks: Blocks) -> dict[str, Any]:
     low, packed, size = _steps(mesh.points)
     kind = "u2" if len(mesh.points) < 65536 else "u4"
     return {
@@ -135,7 +146,7 @@ def _mesh(mesh: meshes.Mesh, colour, blocks: Blocks) -> dict:
     }
 
 
-def _meshes(take: Take, skin: bool, reach: float, blocks: Blocks) -> list[dict]:
+def _meshes(take: Take, skin: bool, reach: float, blocks: Blocks) -> list[dict[str, Any]]:
     """What is rigid: body (-1 = the world) and mesh."""
     made = []
     for mesh, colour in scene.court(reach):
@@ -150,11 +161,11 @@ def _meshes(take: Take, skin: bool, reach: float, blocks: Blocks) -> list[dict]:
     return made
 
 
-def _skin(take: Take, blocks: Blocks) -> dict:
+def _skin(model: Model, blocks: Blocks) -> dict[str, Any]:
     """A skinned mesh per region; bones are bodies, by index."""
     from ..skin import skin
 
-    built = skin.of(take.model)
+    built = skin.of(model)
     inverse = np.tile(np.eye(4), (len(built.bind_q), 1, 1))
     back = Rotation.from_quat(built.bind_q[:, 3:]).inv()
     inverse[:, :3, :3] = back.as_matrix()
