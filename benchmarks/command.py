@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import tyro
@@ -23,6 +23,15 @@ from .scene import hold
 
 HELD = 20
 """Fragments before every side starts again, so that the ball stays in the hand."""
+
+
+class Side(Protocol):
+    """One of those that are timed in turn."""
+
+    def restart(self) -> None: ...
+
+    def advance(self) -> float:
+        """Seconds per step of one world, over one control fragment."""
 
 
 @dataclass
@@ -61,15 +70,16 @@ class Result:
     device: str
     threads: int
     lanes: int
-    rows: list[dict] = field(default_factory=list)
+    rows: list[dict[str, float]] = field(default_factory=list)
     """one per number of worlds: worlds, steps_per_second, us_per_world"""
-    parts_us: dict = field(default_factory=dict)
+    parts_us: dict[str, float] = field(default_factory=dict)
+    """[us] per world of each part of a step"""
     first_step_s: float = 0.0
     kib_per_world: float = 0.0
     contacts: float = 0.0
     velocity_error: float = 0.0
     """[rad/s], see `ours.solver_error`"""
-    peers: dict = field(default_factory=dict)
+    peers: dict[str, dict[str, float | None]] = field(default_factory=dict)
     """setting -> steps_per_second, contacts, velocity_error, ratio"""
 
 
@@ -91,12 +101,12 @@ def step(options: Step) -> Result:
     sides = [Ours(scene, n, options.device, options.threads, options.lanes) for n in options.worlds]
     sides[0].advance()
     first = time.perf_counter() - start
-    peers = {}
+    peers: dict[str, MuJoCo | MuJoCoWarp] = {}
     if options.against == "mujoco":
         peers = {name: MuJoCo(scene, name) for name in SETTINGS}
     elif options.against == "mujoco_warp":
         peers = {f"Warp, {n} worlds": MuJoCoWarp(scene, n, options.device) for n in options.worlds}
-    times: dict[object, list[float]] = {side: [] for side in (*sides, *peers.values())}
+    times: dict[Side, list[float]] = {side: [] for side in (*sides, *peers.values())}
     for round_ in range(options.rounds):
         for side, seconds in times.items():
             if round_ % HELD == 0:
@@ -126,7 +136,7 @@ def step(options: Step) -> Result:
     return result
 
 
-def solve(options: Solve) -> list[dict]:
+def solve(options: Solve) -> list[dict[str, float]]:
     quiet_warp()
     scene = hold(options.worlds, 40)
     rows = []
@@ -165,14 +175,14 @@ def print_step(result: Result) -> None:
         print(f"{name:>16} {us:8.3f} us {100 * us / total:5.1f} %")
     for name, peer in result.peers.items():
         error = peer["velocity_error"]
-        error = "" if error is None else f"velocity error {error:.1e} rad/s, "
+        off = "" if error is None else f"velocity error {error:.1e} rad/s, "
         print(
             f"MuJoCo {name}: {peer['steps_per_second']:,} steps/s, {peer['contacts']:.1f} contacts, "
-            f"{error}ours is {peer['ratio']} x"
+            f"{off}ours is {peer['ratio']} x"
         )
 
 
-def print_solve(rows: list[dict]) -> None:
+def print_solve(rows: list[dict[str, float]]) -> None:
     print("sweeps      steps/s   residual m/s (median, 95 %)   velocity error rad/s   held")
     for r in rows:
         print(
@@ -182,7 +192,7 @@ def print_solve(rows: list[dict]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options = tyro.extras.subcommand_cli_from_dict(
+    options: Step | Solve = tyro.extras.subcommand_cli_from_dict(
         {"step": Step, "solve": Solve}, args=arguments, prog="warpdribble bench"
     )
     if isinstance(options, Step):

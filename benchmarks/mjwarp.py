@@ -19,7 +19,7 @@ CONTACTS, ROWS = 60, 240
 class MuJoCoWarp:
     """The scene in `worlds` worlds, all with the first world's targets."""
 
-    def __init__(self, scene: Scene, worlds: int, device: str):
+    def __init__(self, scene: Scene, worlds: int, device: str) -> None:
         import mujoco
         import mujoco_warp as mjw
 

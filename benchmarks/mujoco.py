@@ -20,7 +20,7 @@ SETTINGS = {
 class MuJoCo:
     """The scene's first world."""
 
-    def __init__(self, scene: Scene, setting: str):
+    def __init__(self, scene: Scene, setting: str) -> None:
         import mujoco
 
         self.mujoco = mujoco

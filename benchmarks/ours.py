@@ -23,7 +23,9 @@ PARTS = {
 class Ours:
     """The scene in `worlds` worlds, advanced a fragment at a time."""
 
-    def __init__(self, scene: Scene, worlds: int, device: str, threads: int | None, lanes: int | None):
+    def __init__(
+        self, scene: Scene, worlds: int, device: str, threads: int | None, lanes: int | None
+    ) -> None:
         self.scene = scene
         self.sim = Simulation(scene.model, worlds, device=device, threads=threads, lanes=lanes)
         self.restart()
@@ -50,7 +52,7 @@ class Ours:
 
     def parts(self, rounds: int = 9) -> dict[str, float]:
         """Microseconds per world of each part of a step, timed alone on the state of one step."""
-        found = {}
+        found: dict[str, float] = {}
         for name, kernel in PARTS.items():
             self.sim.step(1)
             seconds = []

@@ -6,6 +6,7 @@ import json
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ FRAMES = 600
 ROUNDS = 5
 
 
-def moving(model, frames: int = FRAMES) -> Take:
+def moving(model: Model, frames: int = FRAMES) -> Take:
     """The player and the ball, every joint turning a little in every frame."""
     rng = np.random.default_rng(0)
     joint_q = np.tile(model.start_q, (frames, 1))
@@ -28,7 +29,7 @@ def moving(model, frames: int = FRAMES) -> Take:
     return Take.of(model, pose.forward(model, joint_q), 100.0)
 
 
-def main() -> dict:
+def main() -> dict[str, Any]:
     """Medians [s] and sizes [bytes] per way of writing; the first write, which builds meshes, on its own."""
     model = Model.load("player")
     take = moving(model)
@@ -41,7 +42,7 @@ def main() -> dict:
         "usdc, 64 worlds": ("c.usdc", lambda p: write_take(p, crowd)),
         "html": ("a.html", lambda p: write_replay(p, take)),
     }
-    result = {"frames": FRAMES, "bodies": model.nbody, "rows": {}}
+    rows: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name, (file, job) in jobs.items():
             spent = []
@@ -51,13 +52,14 @@ def main() -> dict:
                 spent.append(round(time.perf_counter() - began, 4))
             size = sum(f.stat().st_size for f in Path(folder).glob(Path(file).stem + ".*usd*"))
             size = size if "usd" in file else (Path(folder) / file).stat().st_size
-            result["rows"][name] = {
+            rows[name] = {
                 "first_s": spent[0],
                 "median_s": float(np.median(spent[1:])),
                 "bytes": size,
             }
             for other in Path(folder).iterdir():
                 other.unlink()
+    result = {"frames": FRAMES, "bodies": model.nbody, "rows": rows}
     print(json.dumps(result, indent=1))
     return result
 

@@ -8,32 +8,40 @@ reads every clip below FOLDER, puts it on the player and writes the tables betwe
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from functools import reduce
 from operator import add
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..clips.read import SUFFIXES, read_clip
+from ..sims import Model
 from ..sims.ball.ball import inferred_ball
-from ..sims.ball.contact_score import score_contacts
+from ..sims.ball.contact_score import ContactScore, score_contacts
 from ..sims.retarget.accuracy import LIMBS, accuracy
 from ..sims.retarget.retarget import retargeted
 from .markers import check_page, write_measured
 
 GOALS = {"mean": 4.0, "hands": 3.0, "slide": 5.0, "slide all": 5.0, "deep": 5.0}
 """[cm], [cm], [mm/s], [mm]."""
+Row = dict[str, Any]
+"""Numbers of one clip by name, and the clip's name."""
 
 
-def measure(model, folder: Path, say=lambda line: None) -> tuple[list[dict], dict]:
+def measure(
+    model: Model, folder: Path, say: Callable[[str], None] = lambda line: None
+) -> tuple[list[Row], dict[str, ContactScore]]:
     """Rows of numbers, one per clip, and clip -> score of the inferred contacts where a ball was recorded."""
-    rows, scores = [], {}
+    rows: list[Row] = []
+    scores: dict[str, ContactScore] = {}
     for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
         motion, _ = read_clip(path)
         result = retargeted(model, motion)
         copied = accuracy(model, retargeted(model, motion, ik=False))
         fit = accuracy(model, result)
-        row = {
+        row: Row = {
             "clip": path.relative_to(folder).as_posix(),
             "scale": result.scale,
             "copied": 100 * copied.mean,
@@ -46,21 +54,21 @@ def measure(model, folder: Path, say=lambda line: None) -> tuple[list[dict], dic
         }
         row |= {limb: 100 * fit.limbs[limb][0] for limb in LIMBS if limb in fit.limbs}
         rows.append(row)
-        if motion.ball_held is not None:
+        held = motion.resample(1.0 / model.timestep).ball_held
+        if held is not None:
             ball = inferred_ball(model, result.reference)
-            held = motion.resample(1.0 / model.timestep).ball_held
-            touch = ball.touch.any(axis=1) if ball is not None else np.zeros_like(held)
+            touch = np.any(ball.touch, axis=1) if ball is not None else np.zeros_like(held)
             scores[row["clip"]] = score_contacts(touch, held, model.timestep)
         say(f"{row['clip']}: mean {row['mean']:.1f} cm, slide {row['slide']:.1f} mm/s")
     return rows, scores
 
 
-def tables(rows: list[dict], scores: dict) -> str:
+def tables(rows: list[Row], scores: dict[str, ContactScore]) -> str:
     """Both tables as Markdown."""
     return "\n".join([*_fit_lines(rows), "", *_contact_lines(scores)])
 
 
-def _fit_lines(rows: list[dict]) -> list[str]:
+def _fit_lines(rows: list[Row]) -> list[str]:
     limbs = [limb for limb in LIMBS if limb in rows[0]]
     lines = ["### Joints, feet and ground", "", f"{len(rows)} clips; misses of the goals in bold.", ""]
     lines.append("| goal | clips that miss it | worst |\n|---|---|---|")
@@ -88,7 +96,7 @@ def _fit_lines(rows: list[dict]) -> list[str]:
     return lines
 
 
-def _contact_lines(scores: dict) -> list[str]:
+def _contact_lines(scores: dict[str, ContactScore]) -> list[str]:
     if not scores:
         return []
     total = reduce(add, scores.values())
@@ -114,14 +122,12 @@ def _contact_lines(scores: dict) -> list[str]:
     return lines
 
 
-def _cell(row: dict, key: str) -> str:
+def _cell(row: Row, key: str) -> str:
     text = f"{row[key]:.1f}"
     return f"**{text}**" if key in GOALS and row[key] >= GOALS[key] else text
 
 
 def main(folder: Path, page: Path) -> None:
-    from ..sims import Model
-
     check_page(page)
     rows, scores = measure(Model.load("player"), folder, lambda line: print(line, flush=True))
     write_measured(page, tables(rows, scores))

@@ -13,11 +13,13 @@ import json
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..learning.evaluate.pushes import DIRECTIONS, PLAYERS, push_table
-from ..learning.evaluate.trials import run_trials
+from ..learning.evaluate.trials import Trials, run_trials
+from ..learning.policies.linear import LinearPolicy
 from ..learning.runs.folder import CONFIG, Run
 from ..learning.runs.log import read_rows
 from ..learning.tasks.disturbance import CALM, Disturbance
@@ -28,9 +30,11 @@ BUSY = Disturbance(arms=0.2, hands=18.0)
 CURVES = "locomotion-curves.png"
 MEASURED = "measured.json"
 """In a run's folder: what was measured once is not measured again."""
+Measured = dict[str, Any]
+"""One run in numbers, by name; and its skill's name and description."""
 
 
-def measure(folder: Path) -> dict:
+def measure(folder: Path) -> Measured:
     """One run in numbers."""
     run, rows = Run.load(folder), read_rows(folder)
     kept = folder / MEASURED
@@ -39,7 +43,7 @@ def measure(folder: Path) -> dict:
     task = run.task(TRIALS)
     blind = task.open_loop()
 
-    def tried(policy, cycles, disturbance=CALM):
+    def tried(policy: LinearPolicy, cycles: float, disturbance: Disturbance = CALM) -> Trials:
         return run_trials(task, policy, run.states, cycles, 1, NOISE, disturbance)
 
     calm, busy, still = tried(run.policy, CYCLES), tried(run.policy, CYCLES, BUSY), tried(blind, 5)
@@ -70,17 +74,17 @@ def measure(folder: Path) -> dict:
     return found
 
 
-def tables(runs: list[dict]) -> str:
+def tables(runs: list[Measured]) -> str:
     """All tables as Markdown; nothing where there are no runs."""
     if not runs:
         return ""
-    skills = {run["skill"]: [] for run in runs}
+    skills: dict[str, list[Measured]] = {run["skill"]: [] for run in runs}
     for run in runs:
         skills[run["skill"]].append(run)
     return "\n".join([*_survival(skills), "", *_tracking(skills), "", *_pushes(skills)])
 
 
-def _survival(skills: dict[str, list[dict]]) -> list[str]:
+def _survival(skills: dict[str, list[Measured]]) -> list[str]:
     lines = [
         f"**Survival**: of {TRIALS} trials of {CYCLES} cycles, each from a random recorded state with joint "
         f"speed noise of {NOISE} rad/s (root: m/s too), friction 0.8, root free; a seed each. Disturbed: "
@@ -104,7 +108,7 @@ def _survival(skills: dict[str, list[dict]]) -> list[str]:
     return lines
 
 
-def _tracking(skills: dict[str, list[dict]]) -> list[str]:
+def _tracking(skills: dict[str, list[Measured]]) -> list[str]:
     lines = [
         "**Tracking**, mean while standing, median of the seeds: angle per joint of legs and trunk; feet and "
         "head in the facing frame; the root's drift from the reference's way in a cycle. Beside it the open "
@@ -114,14 +118,13 @@ def _tracking(skills: dict[str, list[dict]]) -> list[str]:
         "|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for name, runs in skills.items():
-        keys = (("angle", 1), ("ends", 1), ("drift", 1), ("turn", 1))
-        keys += (("open angle", 1), ("open ends", 1), ("open seconds", 1))
-        cells = [f"{np.median([run[key] for run in runs]):.{digits}f}" for key, digits in keys]
+        keys = ("angle", "ends", "drift", "turn", "open angle", "open ends", "open seconds")
+        cells = [f"{np.median([run[key] for run in runs]):.1f}" for key in keys]
         lines.append(f"| {name} | {' | '.join(cells)} |")
     return lines
 
 
-def _pushes(skills: dict[str, list[dict]]) -> list[str]:
+def _pushes(skills: dict[str, list[Measured]]) -> list[str]:
     lines = [
         "**Pushes**: the largest force [N] on the torso for 0.2 s, by direction, that 95 % of 64 players "
         "survive at a random moment (as they do all smaller ones, in steps of 50 N); the least of the seeds.",
