@@ -19,6 +19,7 @@ world coordinates of the zero pose. The right side is the mirror image of the le
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -117,9 +118,9 @@ class Geom:
         """Volume [m^3], centre [m] and inertia about it for unit density [m^5]."""
         edge, r, centre = self.b - self.a, self.radius, (self.a + self.b) / 2
         if self.kind == "box":
-            volume = abs(edge.prod())
+            volume = float(abs(edge.prod()))
             return volume, centre, volume / 12 * (edge @ edge * np.eye(3) - np.diag(edge**2))
-        length = np.linalg.norm(edge)
+        length = float(np.linalg.norm(edge))
         u = edge / length if length else edge
         ball, rod = 4 / 3 * np.pi * r**3, np.pi * r**2 * length
         along = rod * r**2 / 2 + ball * 0.4 * r**2
@@ -131,17 +132,19 @@ class Geom:
 
 @dataclass
 class Body:
-    """A body and the joint at its origin `at` [m]; `axis` of a hinge, or of a knuckle's curl."""
+    """A body and the joint at its origin `at` [m]; `axis` of a hinge, or of a knuckle's curl. The root has no
+    parent, ""."""
 
     name: str
-    parent: str | None
+    parent: str
     joint: str
     at: np.ndarray
     mass: float
     geoms: list[Geom]
     axis: np.ndarray = field(default_factory=lambda: vec(0, 1, 0))
     com: np.ndarray | None = None  # where the table has one; else the centre of the geoms
-    sites: list[tuple] = field(default_factory=list)  # name, position, direction of local z
+    # name, position, direction of local z
+    sites: list[tuple[str, np.ndarray, np.ndarray]] = field(default_factory=list)
 
     @property
     def drive(self) -> str:
@@ -168,17 +171,26 @@ class Body:
         )  # fmt: skip
 
 
-def limb(name, parent, joint, segment, start, end, geoms, **more) -> Body:
+def limb(
+    name: str,
+    parent: str,
+    joint: str,
+    segment: str,
+    start: np.ndarray,
+    end: np.ndarray,
+    geoms: list[Geom],
+    **more: Any,
+) -> Body:
     """A segment between two joints, with the table's mass and centre of mass."""
     com = start + SEGMENTS[segment][2] / 100 * (end - start)
     return Body(name, parent, joint, start, WEIGHT[segment], geoms, com=com, **more)
 
 
-def capsule(colour, radius, a, b) -> Geom:
+def capsule(colour: str, radius: float, a: np.ndarray, b: np.ndarray) -> Geom:
     return Geom("capsule", colour, radius, a, b)
 
 
-def tapered(thick: float, thin: float, a, b) -> list[Geom]:
+def tapered(thick: float, thin: float, a: np.ndarray, b: np.ndarray) -> list[Geom]:
     return [capsule("skin", thick, a, (a + b) / 2), capsule("skin", thin, (a + b) / 2, b)]
 
 
@@ -193,7 +205,7 @@ def trunk() -> list[Body]:
     top, face = vec(0.008, 0, STATURE - HEAD_RADIUS), vec(0.022, 0, STATURE - HEAD_RADIUS - 0.008)
     r, torso = TRUNK_RADIUS, WEIGHT["upper trunk"] * (1 - 2 * CLAVICLE_SHARE)
     return [
-        Body("pelvis", None, "root", vec(0, 0, hip), WEIGHT["lower trunk"],
+        Body("pelvis", "", "root", vec(0, 0, hip), WEIGHT["lower trunk"],
              [capsule("shorts", r, hips, hips * MIRROR)]),
         Body("lower_back", "pelvis", "lower_back", vec(0, 0, navel), WEIGHT["middle trunk"],
              [capsule("jersey", r, waist, waist * MIRROR)]),
@@ -281,7 +293,7 @@ def bodies() -> list[Body]:
     return trunk() + [b for part in left for b in [*part, *(b.mirrored() for b in part)]]
 
 
-def target(body: Body, grip: float, pose: dict) -> np.ndarray:
+def target(body: Body, grip: float, pose: dict[str, Any]) -> np.ndarray:
     """Rotation vector or angle [rad] of a joint in the stand, hands closed by `grip`, with `pose` in
     place of the stand for the joints that it names."""
     if body.joint in pose:
@@ -290,18 +302,18 @@ def target(body: Body, grip: float, pose: dict) -> np.ndarray:
     size = 3 if JOINTS[body.drive][0] == "ball" else 1
     finger = name.split("_")[0]
     if finger in FIST:
-        angle = grip * FIST[finger][("mcp", "pip", "dip").index(body.drive)]
-        return angle * body.axis if size == 3 else np.array([angle])
+        curl = grip * FIST[finger][("mcp", "pip", "dip").index(body.drive)]
+        return curl * body.axis if size == 3 else np.array([curl])
     angle = STAND.get(name, np.zeros(size))
     return -angle * MIRROR if side == "r" and size == 3 else angle
 
 
-def text(values, digits: int = 6) -> str:
+def text(values: Any, digits: int = 6) -> str:
     """Numbers for XML, rounded so that the last bits of the arithmetic cannot change the file."""
     return " ".join(f"{v:.12g}" for v in np.round(np.atleast_1d(values), digits) + 0.0)
 
 
-def add(parent: ET.Element, tag: str, attributes: dict | None = None, **more) -> ET.Element:
+def add(parent: ET.Element, tag: str, attributes: dict[str, Any] | None = None, **more: Any) -> ET.Element:
     """Append an element; numbers become text."""
     items = ((attributes or {}) | more).items()
     return ET.SubElement(parent, tag, {k: v if isinstance(v, str) else text(v) for k, v in items})
@@ -334,7 +346,7 @@ def mjcf() -> str:
     add(world, "light", pos=(0, 0, 4), directional="true")
     add(world, "geom", name="ground", type="plane", size=(0, 0, 0.05), contype=1, conaffinity=0,
         rgba="0.76 0.60 0.42 1", user="1 0.2 1e-5")  # fmt: skip
-    player, elements, at = bodies(), {None: world}, {None: vec(0, 0, 0)}
+    player, elements, at = bodies(), {"": world}, {"": vec(0, 0, 0)}
     for b in player:
         element = add(elements[b.parent], "body", name=b.name, pos=b.at - at[b.parent])
         elements[b.name], at[b.name] = element, b.at
@@ -370,7 +382,7 @@ def mjcf() -> str:
         ctrl = [target(b, grip, pose) for b in player[1:]]
         ball_at = pose.get("ball", (*BALL_XY, BALL_RADIUS))
         q = [Rotation.from_rotvec(t).as_quat(scalar_first=True) if len(t) == 3 else t for t in ctrl]
-        qpos = [player[0].at, upright, *q, ball_at, upright]
+        qpos: list[Any] = [player[0].at, upright, *q, ball_at, upright]
         add(keyframe, "key", name=name, qpos=text(np.concatenate(qpos), 9),
             ctrl=text(np.concatenate(ctrl), 9))  # fmt: skip
     ET.indent(root)
@@ -379,7 +391,7 @@ def mjcf() -> str:
 
 def _contents(element: ET.Element, b: Body) -> None:
     """Joint, inertia, geoms and sites of a body."""
-    if b.parent is None:
+    if not b.parent:
         add(element, "freejoint", name=b.joint)
     else:
         axis = {} if JOINTS[b.drive][0] == "ball" else {"axis": text(b.axis, 9)}
@@ -389,7 +401,7 @@ def _contents(element: ET.Element, b: Body) -> None:
     add(element, "inertial", pos=com - b.at, mass=text(b.mass, 12), fullinertia=text(full, 12))
     for letter, g in zip("abc", b.geoms):
         name = b.name if len(b.geoms) == 1 else f"{b.name}_{letter}"
-        shape = {"class": g.colour, "name": name, "type": g.kind}
+        shape: dict[str, Any] = {"class": g.colour, "name": name, "type": g.kind}
         if g.kind == "capsule":
             shape |= {"fromto": np.concatenate([g.a - b.at, g.b - b.at]), "size": g.radius}
         else:
