@@ -8,6 +8,7 @@ import warp as wp
 
 from .collide import probe
 from .kinematics import inertias, joint_dofs, kinematics
+from .port import give
 from .spatial import *
 from .tree import BALL, GROUND, HINGE, Tree, World
 
@@ -23,7 +24,7 @@ def load(device) -> None:
 
 @wp.kernel
 def bodies(
-    tree: Tree, world: World, first: int, pose: wp.array2d(dtype=Real), velocity: wp.array2d(dtype=Real)
+    tree: Tree, world: World, first: int, pose: wp.array2d(dtype=float), velocity: wp.array2d(dtype=float)
 ):
     """pose: 7 per body, position [m] and quaternion xyzw of its frame; velocity: 6 per body, of its
     centre of mass [m/s] and angular [rad/s], along the world's axes."""
@@ -36,19 +37,19 @@ def bodies(
         x = world.pos[g, i] + rotate(R, tree.body_offset[b])
         q = world.turn[g, i] * quat(tree.body_turn[b])
         v = V.v + cross(V.w, rotate(R, tree.body_com[b]))
-        pose[g, 7 * b] = x.x
-        pose[g, 7 * b + 1] = x.y
-        pose[g, 7 * b + 2] = x.z
-        pose[g, 7 * b + 3] = q.x
-        pose[g, 7 * b + 4] = q.y
-        pose[g, 7 * b + 5] = q.z
-        pose[g, 7 * b + 6] = q.w
-        velocity[g, 6 * b] = v.x
-        velocity[g, 6 * b + 1] = v.y
-        velocity[g, 6 * b + 2] = v.z
-        velocity[g, 6 * b + 3] = V.w.x
-        velocity[g, 6 * b + 4] = V.w.y
-        velocity[g, 6 * b + 5] = V.w.z
+        give(pose, g, 7 * b, x.x)
+        give(pose, g, 7 * b + 1, x.y)
+        give(pose, g, 7 * b + 2, x.z)
+        give(pose, g, 7 * b + 3, q.x)
+        give(pose, g, 7 * b + 4, q.y)
+        give(pose, g, 7 * b + 5, q.z)
+        give(pose, g, 7 * b + 6, q.w)
+        give(velocity, g, 6 * b, v.x)
+        give(velocity, g, 6 * b + 1, v.y)
+        give(velocity, g, 6 * b + 2, v.z)
+        give(velocity, g, 6 * b + 3, V.w.x)
+        give(velocity, g, 6 * b + 4, V.w.y)
+        give(velocity, g, 6 * b + 5, V.w.z)
 
 
 @wp.kernel

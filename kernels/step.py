@@ -12,7 +12,8 @@ from .drive import LAST_TRIAL
 from .integrate import integrate
 from .kinematics import inertias, kinematics
 from .spatial import *
-from .tree import Tree, World
+from .tree import CARRIED, COLUMNS, Tree, World  # noqa: F401
+from .watch import Watch, begin, look
 
 wp.set_module_options(
     {
@@ -46,12 +47,15 @@ def advance(tree: Tree, world: World, g: int):
 
 
 @wp.kernel
-def step(tree: Tree, world: World, first: int, count: int, course: Course):
+def step(tree: Tree, world: World, first: int, count: int, course: Course, watch: Watch):
     g = first + wp.tid()
+    begin(watch, g)
     for k in range(count):
         if course.table.shape[0] > 0:
             aim(tree, world, course, g, k)
         advance(tree, world, g)
+        if watch.kind.shape[0] > 0:
+            look(tree, world, watch, course.row, g, k)
 
 
 @wp.kernel

@@ -189,3 +189,19 @@ class World:
     fumbled: wp.array2d(dtype=Real)
     hurried: wp.array2d(dtype=Real)
     """status flags: the state is not finite, a fall, a bad contact, a joint at max_speed"""
+
+
+COLUMNS = {
+    "q": "q target",
+    "dof": "qd joint_f s U d w",
+    "link": "mass_scale turn R pos r V A I p pull torque full touched knock",
+    "slot": "gap point normal goal impulse",
+    "pair": "friction restitution",
+    "body": "force",
+    "world": "broken fallen fumbled hurried",
+    "response": "y",
+    "use": "active",
+}
+"""What the columns of a `World`'s arrays are: a joint coordinate each, a degree of freedom, ..."""
+CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
+"""Arrays that a step hands to the next."""

@@ -14,7 +14,18 @@ if TYPE_CHECKING:
     from .recording import Motion
     from .reference import Cycle, Reference, close_cycle, mirrored
     from .retarget import MappingError, find_mapping, read_mapping, retargeted
-    from .worlds import BAD_CONTACT, FALL, NONFINITE, OVERSPEED, Contacts, Simulation
+    from .worlds import (
+        BAD_CONTACT,
+        FALL,
+        NONFINITE,
+        OVERSPEED,
+        Contacts,
+        Course,
+        Probe,
+        Simulation,
+        State,
+        Watch,
+    )
 
 __all__ = [
     "AUTHORED",
@@ -24,13 +35,17 @@ __all__ = [
     "OVERSPEED",
     "Ball",
     "Contacts",
+    "Course",
     "Cycle",
     "MappingError",
     "Model",
     "ModelError",
     "Motion",
+    "Probe",
     "Reference",
     "Simulation",
+    "State",
+    "Watch",
     "authored_clip",
     "close_cycle",
     "find_mapping",
@@ -50,6 +65,6 @@ __getattr__, __dir__ = lazily(
         ".recording": "Motion",
         ".reference": "Cycle Reference close_cycle mirrored",
         ".retarget": "MappingError find_mapping read_mapping retargeted",
-        ".worlds": "Simulation Contacts NONFINITE FALL BAD_CONTACT OVERSPEED",
+        ".worlds": "Simulation Contacts State Course Probe Watch NONFINITE FALL BAD_CONTACT OVERSPEED",
     },
 )

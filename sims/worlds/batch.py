@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ... import kernels
-from ..model.model import Model
+from ..model import Model
+from .state import QUANTITIES, Block, Layout
 
 RESPONSE_ROOM = 1365
 """Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
-
-
-CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
-"""State that a step hands to the next."""
 
 
 def widest_lanes() -> int:
@@ -58,22 +58,25 @@ class Batch:
         self.world_count = world_count
         self.device = find_device(device)
         on_cpu = self.device.is_cpu
-        self.lanes = lanes or (widest_lanes() if on_cpu else 1)
+        self.lanes: int = lanes or (widest_lanes() if on_cpu else 1)
         if not on_cpu and self.lanes != 1:
             raise ValueError("lanes are for the CPU; on CUDA leave them out")
         self._side_by_side = not on_cpu
         self._program = kernels.program(self.lanes)
-        self._observer = kernels.program(self.lanes, "observe")
-        self._exchange = kernels.program(self.lanes, "exchange")
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
-        self._loaded: set = set()
+        self._loaded: set[ModuleType] = set()
         self._tree = self._make_tree()
+        self._tree_version = 0
         self._world = self._make_world()
         self._fill_defaults()
 
-    def _make_tree(self):
+    def program(self, module: str) -> ModuleType:
+        """A kernel module for this batch's lanes."""
+        return kernels.program(self.lanes, module)
+
+    def _make_tree(self) -> Any:
         """The model as the kernels' `Tree`."""
         program, model = self._program, self.model
         tree = program.Tree()
@@ -93,59 +96,91 @@ class Batch:
         tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
         return tree
 
-    def _make_world(self):
+    def _make_world(self) -> Any:
         """State of all worlds, `(groups, n)` each."""
         program, model, tree = self._program, self.model, self._tree
-        links = tree.link_count + 1
         longest = int(max(model.tables.get("slot_length", np.zeros(1)), default=0)) + program.HEAD
-        counts = dict.fromkeys(("q", "target"), model.nq)
-        counts |= dict.fromkeys(("qd", "joint_f", "s", "U", "d", "w"), model.nv)
-        counts |= dict.fromkeys(("mass_scale", "turn", "R", "pos", "r", "V", "A", "I", "p"), links)
-        counts |= dict.fromkeys(("pull", "torque", "full", "touched", "knock"), links)
-        counts |= dict.fromkeys(("gap", "point", "normal", "goal", "impulse"), tree.slot_count)
-        counts |= dict.fromkeys(("friction", "restitution"), len(model.pairs))
-        counts |= dict.fromkeys(("broken", "fallen", "fumbled", "hurried"), 1)
-        counts |= {
-            "force": model.nbody,
-            "y": tree.response_room + longest,
-            "active": 2 * tree.slot_count + 2,
+        counts = {
+            "q": model.nq,
+            "dof": model.nv,
+            "link": tree.link_count + 1,
+            "slot": tree.slot_count,
+            "pair": len(model.pairs),
+            "body": model.nbody,
+            "world": 1,
+            "response": tree.response_room + longest,
+            "use": 2 * tree.slot_count + 2,
         }
+        columns = {name: counts[kind] for kind, names in program.COLUMNS.items() for name in names.split()}
         world = program.World()
         types = {name: var.type.dtype for name, var in program.World.vars.items()}
-        for name in types.keys() - set(CARRIED):
-            setattr(world, name, self._allocate(counts[name], types[name]))
-        self._lay_out(world, {name: (counts[name], types[name]) for name in CARRIED})
+        for name in types.keys() - set(program.CARRIED):
+            setattr(world, name, self._allocate(columns[name], types[name]))
+        self._lay_out(world, {name: (columns[name], types[name]) for name in program.CARRIED})
         return world
 
-    def _lay_out(self, world, arrays: dict) -> None:
+    def _lay_out(self, world: Any, arrays: dict[str, tuple[int, Any]]) -> None:
         """Arrays, `(count, type)` by name, one after the other in `_carried`, so that a world's state moves
         in one go."""
         lanes, groups = self.lanes, self.groups
-        blocks, start = [], 0
-        for count, dtype in arrays.values():
+        blocks, start = {}, 0
+        public = {inside: name for name, inside in QUANTITIES.items()}
+        for name, (count, dtype) in arrays.items():
             count = max(count, 1)
-            parts = wp.types.type_size_in_bytes(dtype) // (4 * lanes)
+            parts = self._parts(dtype)
             strides = (count * parts * lanes, parts * lanes)
             if self._side_by_side:
                 strides = (parts, groups * parts)
-            blocks.append((start, count, parts, *strides))
+            blocks[public[name]] = Block(start, count, parts, lanes, *strides)
             start += groups * count * parts * lanes
+        self._layout = Layout(self.world_count, start, blocks)
         self._carried = wp.zeros(start, dtype=float, device=self.device)
-        for (name, (_, dtype)), (start, count, *_) in zip(arrays.items(), blocks):
-            shape = (count, groups) if self._side_by_side else (groups, count)
-            array = wp.array(ptr=self._carried.ptr + 4 * start, dtype=dtype, shape=shape, device=self.device)
+        for (name, (_, dtype)), block in zip(arrays.items(), blocks.values()):
+            n = block.n
+            shape = (n, groups) if self._side_by_side else (groups, n)
+            array: Any = wp.array(
+                ptr=self._carried.ptr + 4 * block.start, dtype=dtype, shape=shape, device=self.device
+            )
             array._ref = self._carried  # as Warp's own views keep what they show
             setattr(world, name, array.transpose() if self._side_by_side else array)
-        block = self._exchange.Block
-        table = np.array(blocks, np.int32).view(block.numpy_dtype()).ravel()
-        self._blocks = wp.array(table, dtype=block, device=self.device)
+        self._blocks = self._block_table(self._layout)
 
-    def _allocate(self, count: int, dtype) -> wp.array:
+    def _block_table(self, layout: Layout) -> wp.array:
+        """The kernels' view of a layout, in the order of this batch's quantities."""
+        block = self.program("place").Block
+        absent = Block(0, 0, 1, 1, 0, 0)
+        rows = [vars(layout.blocks.get(name, absent)).values() for name in QUANTITIES]
+        table = np.array([[*row] for row in rows], np.int32).view(block.numpy_dtype()).ravel()
+        return wp.array(table, dtype=block, device=self.device)
+
+    def _parts(self, dtype: Any) -> int:
+        """Floats that one number of an array has for each world."""
+        return int(wp.types.type_size_in_bytes(dtype) // (4 * self.lanes))
+
+    def _allocate(self, count: int, dtype: Any) -> wp.array:
         """Zeros `(groups, count)`."""
         shape = (self.groups, max(count, 1))
         if self._side_by_side:
             return wp.zeros(shape[::-1], dtype=dtype, device=self.device).transpose()
         return wp.zeros(shape, dtype=dtype, device=self.device)
+
+    def new_port(self, columns: int) -> wp.array:
+        """Zeros `(world_count, columns)`, for what crosses the edge; see `kernels.port`."""
+        shape = (self.world_count, columns)
+        if self._side_by_side:
+            return wp.zeros(shape[::-1], dtype=float, device=self.device).transpose()
+        return wp.zeros(shape, dtype=float, device=self.device)
+
+    def new_rows(self) -> wp.array:
+        """Zeros `(world_count,)`, for the row of a table or a pool that each world has."""
+        return wp.zeros(self.world_count, dtype=int, device=self.device)
+
+    def set_rows(self, array: wp.array, rows: Any) -> None:
+        """Set an array of `new_rows` (world_count,)."""
+        if self.device.is_cpu:
+            array.numpy()[:] = rows
+        else:
+            array.assign(np.broadcast_to(np.asarray(rows, np.int32), (self.world_count,)))
 
     def _fill_defaults(self) -> None:
         pairs = self.model.pairs
@@ -173,13 +208,13 @@ class Batch:
         rows = rows.reshape(-1, *rows.shape[2:])[: self.world_count]
         return rows[..., 0] if rows.shape[-1] == 1 else rows
 
-    def _write(self, name: str, worlds: np.ndarray, values, column: int | None = None) -> None:
+    def _write(self, name: str, worlds: np.ndarray, values: Any, column: int | None = None) -> None:
         """Set a state array of some worlds, or one column of it: `values` `(..., n * parts)`, for each
         world or for all. The unused worlds of the last group follow the last world."""
         array = getattr(self._world, name)
         if column is not None:
             array = array[:, column : column + 1]
-        n, parts = array.shape[1], wp.types.type_size_in_bytes(array.dtype) // (4 * self.lanes)
+        n, parts = array.shape[1], self._parts(array.dtype)
         values = np.asarray(values, np.float32)
         if values.ndim:
             values = values.reshape(-1, n, parts)
@@ -205,22 +240,11 @@ class Batch:
             if not np.shares_memory(there, rows):
                 there[:] = rows
             return
-        structured = hasattr(array.dtype, "numpy_dtype")
-        dtype = array.dtype.numpy_dtype() if structured else np.float32
+        kind: Any = array.dtype
+        dtype = kind.numpy_dtype() if hasattr(kind, "numpy_dtype") else np.float32
         array.assign(np.ascontiguousarray(rows).reshape(-1).view(dtype).reshape(array.shape))
 
-    def _padded(self, values: np.ndarray) -> np.ndarray:
-        """Values (world_count, ...) with the last world's repeated for the unused ones of its group."""
-        spare = self.groups * self.lanes - self.world_count
-        return np.pad(values, [(0, spare)] + [(0, 0)] * (np.ndim(values) - 1), mode="edge")
-
-    def _fill(self, array: wp.array, values: np.ndarray) -> None:
-        """Set an array `(groups, n)` of Reals from `values` (world_count, n)."""
-        values = self._padded(np.asarray(values, np.float32))
-        values = values.reshape(self.groups, self.lanes, -1).transpose(0, 2, 1)
-        self._assign(array, values[:, :, None])
-
-    def _worlds(self, worlds) -> np.ndarray:
+    def _worlds(self, worlds: Any) -> np.ndarray:
         if worlds is None:
             return np.arange(self.world_count)
         worlds = np.atleast_1d(np.asarray(worlds))
@@ -236,31 +260,46 @@ class Batch:
 
     def launch(self, kernel: str, count: int = 1) -> None:
         """Run a kernel of `kernels.step`, the whole step or a part of it, `count` times."""
-        self._run(self._program, kernel, [count])
+        self.run(self._program, kernel, [count])
 
-    def _run(self, program, kernel: str, inputs: list) -> None:
-        """Launch over all groups, a slice of them per thread."""
-        function = getattr(program, kernel)
-        size = -(-self.groups // self.threads)
+    def run(self, program: ModuleType, kernel: str, inputs: list[Any]) -> None:
+        """Launch a kernel over all groups, a slice of them per thread. program: a module of `program`;
+        inputs: what follows tree, world and the first group."""
+        self.prepared(program, kernel, inputs)()
 
-        def run(first: int) -> None:
-            wp.launch(
-                function,
-                dim=min(size, self.groups - first),
-                inputs=[self._tree, self._world, first, *inputs],
-                device=self.device,
-            )
-
+    def prepared(self, program: ModuleType, kernel: str, inputs: list[Any]) -> Callable[[], None]:
+        """What launches a kernel, to be called many times: arguments are packed once. What the arrays among
+        the inputs hold may change, the inputs not."""
+        function, size = getattr(program, kernel), -(-self.groups // self.threads)
         if program not in self._loaded:
             program.load(self.device)  # before threads launch it
             self._loaded.add(program)
-        others = [self._pool.submit(run, first) for first in range(size, self.groups, size)]
-        run(0)  # this thread works too
-        for other in others:
-            other.result()
+        commands: list[wp.Launch] = []
+        tree = -1
+
+        def launch() -> None:
+            nonlocal tree
+            if tree != self._tree_version:  # the tree is among the arguments
+                tree = self._tree_version
+                commands[:] = [
+                    wp.launch(
+                        function,
+                        dim=min(size, self.groups - first),
+                        inputs=[self._tree, self._world, first, *inputs],
+                        device=self.device,
+                        record_cmd=True,
+                    )
+                    for first in range(0, self.groups, size)
+                ]
+            others = [self._pool.submit(command.launch) for command in commands[1:]]
+            commands[0].launch()  # this thread works too
+            for other in others:
+                other.result()
+
+        return launch
 
     @property
     def memory_per_world(self) -> float:
         """Bytes of state a world takes."""
         arrays = (getattr(self._world, name) for name in self._program.World.vars)
-        return sum(a.capacity for a in arrays) / (self.groups * self.lanes)
+        return float(sum(a.capacity for a in arrays) / (self.groups * self.lanes))

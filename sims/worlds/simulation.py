@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
 
-from ..model.model import Model
-from .batch import CARRIED, Batch
+from ..model import Model
+from .batch import Batch
+from .state import State
 from .tensors import Tensors, as_array
 
 SWEEPS = 10
@@ -19,6 +23,9 @@ MAX_SPEED = 100.0
 
 NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
 """Bits of `Simulation.status`."""
+
+PORTS = {"joint_q": "q", "joint_qd": "qd", "joint_target_q": "target", "joint_f": "joint_f"}
+"""What a port can be opened to, and the array behind it."""
 
 
 @dataclass
@@ -65,7 +72,43 @@ class Simulation(Batch):
         self._tree.sweeps = sweeps
         self._tree.max_speed = max_speed
         self._targets_set = False
+        self._ports: dict[str, wp.array] = {}
+        self._row = self.new_rows()
+        inputs = [self._row, self._carried, self._blocks, self._carried, self._blocks]
+        self._copy = self.prepared(self.program("place"), "place", inputs)
         self.reset()
+
+    # --------------------------------------------------------------------------------------- the edge
+
+    def port(self, name: str) -> wp.array:
+        """Live memory `(world_count, n)` of joint_q, joint_qd, joint_target_q or joint_f: it shows what the
+        worlds have, and what is written to it they have, on every device and at every lane count. From the
+        first call on, each step costs the two copies that this takes; one lane has none, as its worlds lie
+        like that anyway."""
+        if name not in PORTS:
+            raise ValueError(f"no port {name!r}; there are {', '.join(PORTS)}")
+        lanes = getattr(self._world, PORTS[name])
+        if name == "joint_target_q":
+            self._targets_set = True
+        if self.lanes == 1:
+            return lanes[: self.world_count]
+        if name not in self._ports:
+            self._ports[name] = self.new_port(lanes.shape[1])
+            self.run(self.program("port"), "show", [lanes, self._ports[name]])
+        return self._ports[name]
+
+    def _take_over(self) -> None:
+        """What was written to ports becomes the worlds'."""
+        for name, port in self._ports.items():
+            self.run(self.program("port"), "read", [getattr(self._world, PORTS[name]), port])
+
+    @contextlib.contextmanager
+    def _changing(self) -> Iterator[None]:
+        """Around what changes the worlds: open ports are read before it and show what became of it."""
+        self._take_over()
+        yield
+        for name, port in self._ports.items():
+            self.run(self.program("port"), "show", [getattr(self._world, PORTS[name]), port])
 
     # ------------------------------------------------------------------------------------ control
 
@@ -101,43 +144,69 @@ class Simulation(Batch):
         q = self._unit(self._values("joint_q", joint_q, model.nq, len(worlds)), "joint_q")
         qd = np.zeros(model.nv) if joint_qd is None else joint_qd
         qd = self._values("joint_qd", qd, model.nv, len(worlds))
-        for name in CARRIED:
-            self._write(name, worlds, {"q": q, "qd": qd}.get(name, 0.0))
+        if len(np.atleast_2d(q)) < len(np.atleast_2d(qd)):
+            q = np.broadcast_to(q, (len(worlds), model.nq))
+        pool = State.of(model, q, qd, self.device)
+        rows = np.full(self.world_count, -1)
+        rows[worlds] = np.arange(len(worlds)) if len(pool) == len(worlds) else 0
+        self.place(pool, rows)
         if not self._targets_set:
             self._write("target", worlds, q)
 
-    def copy_worlds(self, sources) -> None:
+    def place(self, pool: State, rows: Any = None) -> None:
+        """Put worlds into states of a pool, in one launch: each into its row of `rows` (world_count,), -1
+        leaves a world alone; by default world k into state k. Targets, forces and parameters stay."""
+        if rows is None:
+            if len(pool) != self.world_count:
+                raise ValueError(f"the pool has {len(pool)} states for {self.world_count} worlds: give rows")
+            if pool.layout == self._layout and pool.data.device == self.device:
+                with self._changing():
+                    wp.copy(self._carried, pool.data)
+                return
+            rows = np.arange(self.world_count)
+        rows = np.asarray(rows)
+        if rows.shape != (self.world_count,) or not np.issubdtype(rows.dtype, np.integer):
+            raise ValueError(f"rows must be {self.world_count} whole numbers, one for each world")
+        if rows.max(initial=-1) >= len(pool) or rows.min(initial=0) < -1:
+            raise IndexError(f"rows must lie in -1 .. {len(pool) - 1}")
+        same = pool.layout == self._layout
+        blocks = self._blocks if same else self._block_table(pool.layout)
+        self.set_rows(self._row, rows)
+        with self._changing():
+            inputs = [self._row, pool.data.to(self.device), blocks, self._carried, self._blocks]
+            self.run(self.program("place"), "place", inputs)
+
+    def state(self) -> State:
+        """What all worlds have now, contact history and status included, for `place`."""
+        self._take_over()
+        return State(wp.clone(self._carried), self._layout)
+
+    def copy_worlds(self, sources: Any) -> None:
         """Give every world the state of another: world k becomes what world `sources[k]` (world_count,)
         is now, its contact history and status included. Targets, forces and parameters stay."""
         sources = self._worlds(sources)
         if sources.shape != (self.world_count,):
             raise ValueError(f"sources must have shape ({self.world_count},), not {sources.shape}")
-        moves = self._padded(sources).reshape(self.groups, self.lanes)
-        moves = wp.array(moves, dtype=int, device=self.device)
-        state = self._carried
+        self._take_over()
         if (sources[sources] != sources).any():  # a world that is copied from changes, too
-            state = self.snapshot()
-        self._run(self._exchange, "gather", [moves, self._blocks, state, self._carried])
-
-    def snapshot(self) -> wp.array:
-        """The state of all worlds, contact history and status included, for `restore`."""
-        return wp.clone(self._carried)
-
-    def restore(self, snapshot: wp.array) -> None:
-        """Put all worlds into the state of a `snapshot` of this simulation."""
-        wp.copy(self._carried, snapshot)
+            return self.place(self.state(), sources)
+        self.set_rows(self._row, np.where(sources == np.arange(self.world_count), -1, sources))
+        with self._changing():
+            self._copy()
 
     def set_targets(self, joint_target_q) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
         target = self._values("joint_target_q", joint_target_q, self.model.nq, self.world_count)
         target = self._unit(target, "joint_target_q")
-        self._write("target", np.arange(self.world_count), target)
+        with self._changing():
+            self._write("target", np.arange(self.world_count), target)
         self._targets_set = True
 
     def set_joint_force(self, joint_f) -> None:
         """Generalised forces on all dofs, until changed: (nv,) or (world_count, nv) [N, N m]."""
         f = self._values("joint_f", joint_f, self.model.nv, self.world_count)
-        self._write("joint_f", np.arange(self.world_count), f)
+        with self._changing():
+            self._write("joint_f", np.arange(self.world_count), f)
 
     def apply_force(self, body: str | int, force, worlds=None) -> None:
         """A force (3,) or (len(worlds), 3) [N, world axes] at a body's centre of mass, until changed."""
@@ -147,7 +216,7 @@ class Simulation(Batch):
             raise IndexError(f"body must lie in 0 .. {self.model.nbody - 1}, not {body}")
         force = self._values("force", force, 3, len(worlds))
         self._write("force", worlds, np.atleast_2d(force), column=body)
-        self._tree.forced = 1
+        self.forced = True
 
     def set_root_drive(
         self,
@@ -176,38 +245,60 @@ class Simulation(Batch):
 
     def step(self, count: int = 1) -> None:
         """Advance all worlds by `count` steps of `model.timestep`."""
-        self._run(self._program, "step", [count, self._program.Course()])
+        self.advance(count, self._program.Course(), self._program.Watch())
+
+    def advance(self, count: int, course: Any, watch: Any) -> None:
+        """The same along a `Course`, watched by a `Watch`, both of the kernels."""
+        self.advancing(count, course, watch)()
+
+    def advancing(self, count: int, course: Any, watch: Any) -> Callable[[], None]:
+        """What does that, to be called many times."""
+        launch = self.prepared(self._program, "step", [count, course, watch])
+
+        def advance() -> None:
+            with self._changing():
+                launch()
+
+        return advance
 
     @property
     def forced(self) -> bool:
         """Whether any external force was ever applied; kernels look for them from then on."""
         return bool(self._tree.forced)
 
+    @forced.setter
+    def forced(self, on: bool) -> None:
+        if on != self.forced:
+            self._tree.forced = int(on)
+            self._tree_version += 1
+
     # ------------------------------------------------------------------------------- observations
 
     @property
     def joint_q(self) -> np.ndarray:
         """(world_count, nq) [m, rad, -]"""
+        self._take_over()
         return self._read(self._world.q)
 
     @property
     def joint_qd(self) -> np.ndarray:
         """(world_count, nv) [m/s, rad/s]"""
+        self._take_over()
         return self._read(self._world.qd)
 
     @property
     def torch(self) -> Tensors:
-        """The state as torch tensors, without a copy where the layout allows"""
+        """The state as torch tensors: live memory, see `port`"""
         return Tensors(self)
 
     def bodies(self) -> tuple[np.ndarray, np.ndarray]:
         """`body_q` and `body_qd`, in one go"""
         n = self.model.nbody
-        pose = self._allocate(7 * n, self._program.Real)
-        velocity = self._allocate(6 * n, self._program.Real)
-        self._run(self._observer, "bodies", [pose, velocity])
+        self._take_over()
+        pose, velocity = self.new_port(7 * n), self.new_port(6 * n)
+        self.run(self.program("observe"), "bodies", [pose, velocity])
         shape = (self.world_count, n, -1)
-        return self._read(pose).reshape(shape), self._read(velocity).reshape(shape)
+        return pose.numpy().reshape(shape), velocity.numpy().reshape(shape)
 
     @property
     def body_q(self) -> np.ndarray:
@@ -226,14 +317,16 @@ class Simulation(Batch):
         than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand),
         `OVERSPEED` (a joint was held back to `max_speed`)"""
         flags = {"broken": NONFINITE, "fallen": FALL, "fumbled": BAD_CONTACT, "hurried": OVERSPEED}
-        return sum(
+        bits = [
             bit * (self._read(getattr(self._world, name))[:, 0] > 0).astype(np.int32)
             for name, bit in flags.items()
-        )
+        ]
+        return np.asarray(np.sum(bits, axis=0, dtype=np.int32))
 
     def contacts(self) -> Contacts:
         """Every slot of every world: its gap now, and the impulse of the last step."""
-        self._run(self._observer, "gaps", [])
+        self._take_over()
+        self.run(self.program("observe"), "gaps", [])
         model, world = self.model, self._world
         count = self._tree.slot_count
         impulse = self._read(world.impulse)[:, :count]
@@ -262,20 +355,22 @@ class Simulation(Batch):
     def contact_residual(self) -> np.ndarray:
         """(world_count,) largest velocity [m/s] by which a contact of the last step misses its law"""
         out = self._allocate(1, self._program.Real)
-        self._run(self._program, "run_residual", [out])
+        self.run(self._program, "run_residual", [out])
         return self._read(out)[:, 0]
 
     def mass_matrix(self) -> np.ndarray:
         """(world_count, nv, nv) joint-space inertia, armature included [kg, kg m, kg m^2]"""
         M = self._allocate(self.model.nv**2, self._program.Real)
-        self._run(self._observer, "mass_matrix", [M])
+        self._take_over()
+        self.run(self.program("observe"), "mass_matrix", [M])
         return self._read(M).reshape(self.world_count, self.model.nv, self.model.nv)
 
     def bias_force(self) -> np.ndarray:
         """(world_count, nv) Coriolis, centrifugal and gravity force, as they stand on the left of
         M qdd + bias = f [N, N m]; applied external forces count in"""
         C = self._allocate(self.model.nv, self._program.Real)
-        self._run(self._observer, "bias_force", [C])
+        self._take_over()
+        self.run(self.program("observe"), "bias_force", [C])
         return self._read(C)
 
     # ------------------------------------------------------------------------- parameters by world

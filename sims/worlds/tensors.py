@@ -2,46 +2,53 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import warp as wp
+
+if TYPE_CHECKING:
+    import torch
+
+    from .simulation import Simulation
 
 
 class Tensors:
     """State of a simulation, `(world_count, n)` torch tensors on its device.
 
-    On CUDA, and on a CPU with one lane, they are the simulation's own memory: what the next step
-    changes they show, and writing to them sets the state. With several lanes the worlds of a group lie
-    interleaved, no tensor can describe that, and they are copies.
+    They are live memory: what the next step changes they show, and writing to them sets the state; see
+    `Simulation.port`. Quaternions (xyzw) that are written should have unit length.
     """
 
-    def __init__(self, sim):
+    def __init__(self, sim: Simulation):
         self._sim = sim
 
     @property
-    def joint_q(self):
+    def joint_q(self) -> torch.Tensor:
         """(world_count, nq) [m, rad, -]"""
-        return self._tensor("q")
+        return self._tensor("joint_q")
 
     @property
-    def joint_qd(self):
+    def joint_qd(self) -> torch.Tensor:
         """(world_count, nv) [m/s, rad/s]"""
-        return self._tensor("qd")
+        return self._tensor("joint_qd")
 
     @property
-    def joint_target_q(self):
+    def joint_target_q(self) -> torch.Tensor:
         """(world_count, nq) [m, rad, -]"""
-        return self._tensor("target")
+        return self._tensor("joint_target_q")
 
-    def _tensor(self, name: str):
-        import torch
+    @property
+    def joint_f(self) -> torch.Tensor:
+        """(world_count, nv) generalised forces [N, N m]"""
+        return self._tensor("joint_f")
 
-        array = getattr(self._sim._world, name)
-        if self._sim.lanes == 1:
-            return wp.to_torch(array, requires_grad=False)[: self._sim.world_count]
-        return torch.from_numpy(self._sim._read(array))
+    def _tensor(self, name: str) -> torch.Tensor:
+        tensor: torch.Tensor = wp.to_torch(self._sim.port(name), requires_grad=False)
+        return tensor
 
 
-def as_array(values) -> np.ndarray:
+def as_array(values: Any) -> np.ndarray:
     """A torch tensor, on any device, or anything array-like, as float32 NumPy."""
     if hasattr(values, "detach"):
         values = values.detach().cpu().numpy()
