@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..sims.reference.feedforward import leading_targets
 from ..sims.reference.reference import Cycle, Reference, resample_q
 
+if TYPE_CHECKING:
+    from ..sims.model import Model
+
 STEPS = 5
 """Time steps of a control fragment: 0.05 s (P1 3.2)."""
 SHORTEST = 4
 """Fragments of a cycle that can be learned."""
+
+Transition = tuple[tuple[int, int], tuple[int, int]]
+"""(graph, fragment) and the (graph, fragment) that may follow it."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Fragments in a row that belong together: a skill's cycle, a clip."""
+
+    name: str
+    first: int
+    count: int
 
 
 @dataclass(frozen=True)
@@ -38,6 +56,10 @@ class ControlGraph:
     """[s]"""
     stretch: float = 1.0
     """Its time was stretched by this factor, for whole fragments."""
+    spans: tuple[Span, ...] = ()
+    """What it is made of; one of all fragments where nothing is said."""
+    motion: np.ndarray | None = None
+    """(fragments * STEPS, nq) the reference after each time step; None in graphs of older files"""
 
     def __post_init__(self):
         edges = np.asarray(self.edges, int).reshape(-1, 2)
@@ -47,9 +69,7 @@ class ControlGraph:
         if len(ends):
             raise ValueError(f"no fragment follows fragment {ends[0]}: a random walk would end there")
         object.__setattr__(self, "edges", edges)
-        order = np.argsort(edges[:, 0], kind="stable")
-        object.__setattr__(self, "_after", edges[order, 1])
-        object.__setattr__(self, "_first", np.searchsorted(edges[order, 0], np.arange(self.count + 1)))
+        object.__setattr__(self, "spans", tuple(self.spans) or (Span("", 0, self.count),))
 
     @property
     def count(self) -> int:
@@ -61,28 +81,76 @@ class ControlGraph:
         """[s] of a fragment"""
         return STEPS * self.timestep
 
-    def follow(self, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """For each fragment k (n,) one that follows it, drawn evenly (n,)."""
-        first = self._first[k]
-        return self._after[first + (random.random(len(k)) * (self._first[k + 1] - first)).astype(int)]
+    @property
+    def cycle(self) -> int:
+        """Fragments of a cycle, the longest where there are several."""
+        return max(span.count for span in self.spans)
+
+    @property
+    def branches(self) -> bool:
+        """Whether any fragment has a choice of successors."""
+        return len(self.edges) > self.count
+
+    def rows(self, model: Model, k: int) -> np.ndarray:
+        """The reference (STEPS + 1, nq) through fragment k, its start included."""
+        if self.motion is None:
+            ends = np.stack([self.start_q[k], self.goal_q[k]])
+            return resample_q(model, ends, np.linspace(0.0, 1.0, STEPS + 1))
+        return np.concatenate([self.start_q[k : k + 1], self.motion[k * STEPS : (k + 1) * STEPS]])
+
+    @cached_property
+    def _successors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Those of all fragments in a row, and where (fragments + 1,) each fragment's begin."""
+        order = np.argsort(self.edges[:, 0], kind="stable")
+        return self.edges[order, 1], np.searchsorted(self.edges[order, 0], np.arange(self.count + 1))
+
+    def after(self, k: int) -> np.ndarray:
+        """Fragments that may follow fragment k."""
+        after, first = self._successors
+        return np.asarray(after[first[k] : first[k + 1]])
+
+    def follow(self, k: np.ndarray, where: np.ndarray | float = 0.0) -> np.ndarray:
+        """For each fragment k (n,) one that follows it; where (n,): which of them, from 0 to 1."""
+        after, begin = self._successors
+        first, count = begin[k], begin[k + 1] - begin[k]
+        return np.asarray(after[first + (where * count).astype(int)])
 
     def save(self, path: str | Path) -> None:
         """Write an .npz file."""
-        np.savez_compressed(path, **{f.name: getattr(self, f.name) for f in fields(self)})
+        arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "spans"}
+        arrays = {name: value for name, value in arrays.items() if value is not None}
+        spans = np.array([[s.name, str(s.first), str(s.count)] for s in self.spans])
+        np.savez_compressed(path, **arrays, spans=spans)
 
     @staticmethod
     def load(path: str | Path) -> ControlGraph:
         """Read what `save` wrote."""
         with np.load(path) as file:
-            values = {f.name: file[f.name] for f in fields(ControlGraph)}
+            values = {f.name: file[f.name] for f in fields(ControlGraph) if f.name in file}
         values |= {name: float(values[name]) for name in ("timestep", "stretch")}
-        return ControlGraph(**values)
+        spans = tuple(Span(str(n), int(a), int(b)) for n, a, b in values.pop("spans", ()))
+        return ControlGraph(**values, spans=spans)
 
 
-def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph:
+def clip_graph(
+    model: Model, reference: Reference, feet: Sequence[str], root_lead: float = 0.0
+) -> ControlGraph:
+    """A reference from its first row to its last, as fragments one after the other; the last follows itself.
+    What is missing to a whole fragment is held still. feet, root_lead: see `leading_targets`."""
+    rows = reference.frame_count - 1
+    count = max(1, -(-rows // STEPS))
+    held = np.minimum(np.arange(count * STEPS + 1), rows)
+    speed = _central_velocity(model, reference)[held]
+    joint_q = reference.joint_q[held]
+    targets = leading_targets(model, reference, feet, root_lead)[held]
+    return _graph(joint_q, speed, targets, reference.timestep, np.minimum(np.arange(count) + 1, count - 1))
+
+
+def cyclic_graph(model: Model, cycle: Cycle, feet: Sequence[str], name: str = "") -> ControlGraph:
     """The smallest graph, a cycle whose last fragment leads to the first.
 
     The cycle's time is stretched to whole fragments. feet: bodies that carry it; see `leading_targets`.
+    name: of its span.
     Raises ValueError for a cycle too short to be cut.
     """
     rows = cycle.reference.frame_count - 1
@@ -94,26 +162,42 @@ def cyclic_graph(model, cycle: Cycle, feet=("l_foot", "r_foot")) -> ControlGraph
     at = np.linspace(0.0, rows, count * STEPS + 1)
     fitted = Reference(resample_q(model, cycle.reference.joint_q, at), cycle.reference.timestep)
     several = Cycle(fitted, cycle.turn, cycle.travel).repeat(model, 3)
-    speed = _central_velocity(model, several)
-    first = np.arange(count + 1) * STEPS + count * STEPS  # of the middle cycle, and of the one after
-    begins, ends = first[:-1], first[1:]
-    targets = leading_targets(model, several, feet)
+    middle = slice(count * STEPS, 2 * count * STEPS + 1)  # so that it has neighbours on both sides
+    speed = _central_velocity(model, several)[middle]
+    targets = leading_targets(model, several, feet)[middle]
+    graph = _graph(
+        several.joint_q[middle], speed, targets, fitted.timestep, (np.arange(count) + 1) % count, name
+    )
+    return replace(graph, stretch=count * STEPS / rows)
+
+
+def _graph(
+    joint_q: np.ndarray,
+    speed: np.ndarray,
+    targets: np.ndarray,
+    timestep: float,
+    after: np.ndarray,
+    name: str = "",
+) -> ControlGraph:
+    """Rows (fragments * STEPS + 1) cut into fragments, of which `after` (fragments,) follow."""
+    begins = np.arange(len(after)) * STEPS
     return ControlGraph(
-        targets=targets[begins[0] + 1 : ends[-1] + 1],
-        start_q=several.joint_q[begins],
+        targets=targets[1:],
+        motion=joint_q[1:],
+        start_q=joint_q[begins],
         start_qd=speed[begins],
-        goal_q=several.joint_q[ends],
-        goal_qd=speed[ends],
-        edges=np.stack([np.arange(count), (np.arange(count) + 1) % count], axis=1),
-        timestep=fitted.timestep,
-        stretch=count * STEPS / rows,
+        goal_q=joint_q[begins + STEPS],
+        goal_qd=speed[begins + STEPS],
+        edges=np.stack([np.arange(len(after)), after], axis=1),
+        timestep=timestep,
+        spans=(Span(name, 0, len(after)),),
     )
 
 
-def joined(graphs: list[ControlGraph], transitions) -> ControlGraph:
-    """Several graphs as one. transitions: ((graph, fragment), (graph, fragment)) pairs, of which the second
-    may follow the first; nothing is blended, so they should lead between similar states. Raises ValueError
-    for a fragment that is not there, or graphs of different time steps."""
+def joined(graphs: Sequence[ControlGraph], transitions: Sequence[Transition]) -> ControlGraph:
+    """Several graphs as one, with the spans of all. transitions: ((graph, fragment), (graph, fragment))
+    pairs, of which the second may follow the first; nothing is blended, so they should lead between similar
+    states. Raises ValueError for a fragment that is not there, or graphs of different time steps."""
     if len({g.timestep for g in graphs}) != 1:
         raise ValueError(f"the graphs have different time steps: {[g.timestep for g in graphs]} s")
     for graph, fragment in (end for edge in transitions for end in edge):
@@ -122,16 +206,19 @@ def joined(graphs: list[ControlGraph], transitions) -> ControlGraph:
     first = np.concatenate([[0], np.cumsum([g.count for g in graphs])[:-1]])
     between = [[first[a] + i, first[b] + j] for (a, i), (b, j) in transitions]
     edges = [g.edges + start for g, start in zip(graphs, first)]
-    arrays = ("targets", "start_q", "start_qd", "goal_q", "goal_qd")
+    arrays = ["targets", "start_q", "start_qd", "goal_q", "goal_qd"]
+    if all(g.motion is not None for g in graphs):
+        arrays.append("motion")
     return ControlGraph(
         **{name: np.concatenate([getattr(g, name) for g in graphs]) for name in arrays},
         edges=np.concatenate([*edges, np.array(between, int).reshape(-1, 2)]),
         timestep=graphs[0].timestep,
         stretch=float(np.mean([g.stretch for g in graphs])),
+        spans=tuple(replace(s, first=s.first + int(at)) for g, at in zip(graphs, first) for s in g.spans),
     )
 
 
-def _central_velocity(model, reference: Reference) -> np.ndarray:
+def _central_velocity(model: Model, reference: Reference) -> np.ndarray:
     """Joint velocities (frames, nv) by central differences."""
     ahead = reference.velocity(model)
     return 0.5 * (ahead + np.concatenate([ahead[:1], ahead[:-1]]))

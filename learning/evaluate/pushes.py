@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..policies.linear import LinearPolicy
-from ..tasks.disturbance import PUSHED
+from ...sims.planar import planar
+from ..choose import RandomWalk
+from ..rollout import Controller, Rollout
+from ..starts import Starts, Streams
+from ..tasks.follow import Follow
 from ..tasks.locomotion import Locomotion
-from .trials import States, planar
 
 DIRECTIONS = (
     "forward",
@@ -52,16 +54,16 @@ class PushTable:
 
 def push_table(
     task: Locomotion,
-    policy: LinearPolicy,
-    states: States,
+    controller: Controller,
+    starts: Starts,
     seed: int = 0,
     progress: Callable[[int, str], None] | None = None,
 ) -> PushTable:
     """Push the players of a task ever harder until no direction is survived. progress: called with the
     rows done and a note."""
-    rows = []
+    rows: list[np.ndarray] = []
     for force in FORCES:
-        rows.append(push_survival(task, policy, states, force, seed))
+        rows.append(push_survival(task, controller, starts, force, seed))
         if progress:
             progress(len(rows), f" of {force} N")
         if not np.logical_and.accumulate(np.array(rows) >= ENOUGH, axis=0)[-1].any():
@@ -70,34 +72,41 @@ def push_table(
 
 
 def push_survival(
-    task: Locomotion, policy: LinearPolicy, states: States, force: float, seed: int = 0
+    task: Locomotion, controller: Controller, starts: Starts, force: float, seed: int = 0
 ) -> np.ndarray:
-    """Share (8,) of players that stand AFTER seconds after a push of `force` [N] on the torso, by the
+    """Share (8,) of players that stand AFTER seconds after a push of `force` [N] on the trunk, by the
     direction of the push from the way they face: forward, forward left, left, ...; NaN where nobody stood
     to be pushed. The worlds of the task share the directions; each is pushed at a random moment."""
-    random = np.random.default_rng(seed)
-    graph, n = task.graph, task.sim.world_count
-    start = states.draw(n, random)
-    k = start.k
-    felt = task.reset(k, start.joint_q, start.joint_qd)
-    task.calm()
-    which = np.arange(n) % len(DIRECTIONS)
-    begins = round(SETTLE / graph.period) + random.integers(graph.count, size=n)
-    lasts = max(1, round(PUSH_TIME / graph.period))
-    after = round(AFTER / graph.period)
-    fell, before, applied = np.zeros(n, bool), np.zeros(n, bool), np.zeros((n, 3))
-    for row in range(begins.max() + lasts + after):
-        facing = planar(task.sim.joint_q)[:, 2] + which * 2.0 * np.pi / len(DIRECTIONS)
-        new = row == begins
-        whom = new & ~fell
-        applied[whom] = force * np.stack([np.cos(facing), np.sin(facing), 0.0 * facing], axis=1)[whom]
-        applied[row == begins + lasts] = 0.0
-        task.sim.apply_force(PUSHED, applied)
-        before |= fell & new
-        felt = task.advance(k, policy.act(task.state(felt, k), k))
-        fell |= task.fallen(felt, k) & (row < begins + lasts + after)
-        k = graph.follow(k, random)
-    task.calm()
-    pushed = np.bincount(which[~before], minlength=len(DIRECTIONS))
-    stood = np.bincount(which[~before & ~fell], minlength=len(DIRECTIONS))
+    streams, period = Streams([np.random.default_rng(seed)], task.worlds), task.graph.period
+    start = starts.draw(streams)
+    moment = (streams.uniform() * task.graph.cycle).astype(int)
+    push = Push(force, round(SETTLE / period) + moment, max(1, round(PUSH_TIME / period)), task.worlds)
+    ends = push.begins + push.lasts + round(AFTER / period)
+    fell, before = np.zeros(task.worlds, bool), np.zeros(task.worlds, bool)
+    for fragment in Rollout(task, controller, RandomWalk(streams), start, push).fragments(ends.max()):
+        before |= fell & (fragment.row == push.begins)
+        fell |= fragment.failed & (fragment.row < ends)
+        push.spared = fell
+    pushed = np.bincount(push.way[~before], minlength=len(DIRECTIONS))
+    stood = np.bincount(push.way[~before & ~fell], minlength=len(DIRECTIONS))
     return np.divide(stood, pushed, out=np.full(len(DIRECTIONS), np.nan), where=pushed > 0)
+
+
+class Push:
+    """Disturbs each world once, by a push from one of the DIRECTIONS."""
+
+    def __init__(self, force: float, begins: np.ndarray, lasts: int, worlds: int):
+        self.force, self.begins, self.lasts = force, begins, lasts
+        self.way = np.arange(worlds) % len(DIRECTIONS)
+        self.spared = np.zeros(worlds, bool)
+        """who (worlds,) lies already"""
+        self._row = 0
+
+    def apply(self, task: Follow) -> None:
+        """Set the forces of the coming fragment."""
+        now = (self._row == self.begins) & ~self.spared
+        facing = planar(task.sim.joint_q)[:, 2] + self.way * 2.0 * np.pi / len(DIRECTIONS)
+        force = self.force * np.stack([np.cos(facing), np.sin(facing), 0.0 * facing], axis=1)
+        task.course.push[now, 0] = force[now]
+        task.course.push[self._row == self.begins + self.lasts, 0] = 0.0
+        self._row += 1

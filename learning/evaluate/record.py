@@ -1,78 +1,69 @@
-"""One player under a policy, recorded at every time step beside its reference."""
+"""A controller at work, recorded at every time step beside its reference."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...sims.reference.reference import over_ground, resample_q
-from ...sims.worlds.simulation import NONFINITE
+from ...sims.model import Model
+from ...sims.planar import composed, over_ground, planar, relative
+from ...sims.trajectory import Trajectory
+from ...sims.worlds import NONFINITE
+from ..choose import Ahead, Chooser
 from ..graph import STEPS, ControlGraph
-from ..policies.linear import LinearPolicy
-from ..tasks.disturbance import CALM, Disturbance
-from ..tasks.locomotion import Locomotion
-from .steer import Steered
-from .trials import States, composed, planar, relative
-
-
-@dataclass(frozen=True)
-class Recording:
-    """A row per time step, the start included."""
-
-    joint_q: np.ndarray
-    """(frames, nq) [m, rad, -]"""
-    body_q: np.ndarray
-    """(frames, nbody, 7) [m, -]"""
-    reference_q: np.ndarray
-    """(frames, nq) of the reference, which walks on from where the player began"""
-    wall_time: float
-    """[s] spent in stepping"""
+from ..rollout import Controller, Disturbs, Rollout
+from ..starts import Starts
+from ..tasks.follow import Follow
 
 
 def record(
-    task: Locomotion,
-    policy: LinearPolicy,
-    states: States,
-    seconds: float,
-    seed: int = 0,
-    disturbance: Disturbance = CALM,
-    progress: Callable[[int], None] | None = None,
-) -> Recording:
-    """Let world 0 of the task follow the policy for whole fragments of about `seconds`, from one of the
-    states. progress: called with the fragments done. Raises FloatingPointError when the state becomes
-    non-finite."""
-    random = np.random.default_rng(seed)
-    graph, sim, model = task.graph, task.sim, task.model
-    start = states.draw(sim.world_count, random)
-    task.reset(start.k, start.joint_q, start.joint_qd)
-    steered = Steered(task, policy, start.k, random, disturbance)
-    joint_q, body_q, wanted = [sim.joint_q[0]], [sim.body_q[0]], []
-    at, wall_time = planar(start.joint_q[:1]), 0.0
-    for done in range(max(1, round(seconds / graph.period))):
-        for _ in range(STEPS):
-            began = time.perf_counter()
-            steered.step()
-            joint_q.append(sim.joint_q[0])
-            wall_time += time.perf_counter() - began
-            body_q.append(sim.body_q[0])
-        rows, at = _reference(model, graph, steered.k[0], at)
-        wanted.append(rows[:-1])
-        if progress:
-            progress(done + 1)
-    task.calm()
-    if sim.status[0] & NONFINITE:
-        raise FloatingPointError("the simulation broke down (non-finite state); try another --seed")
-    return Recording(np.array(joint_q), np.array(body_q), np.concatenate([*wanted, rows[-1:]]), wall_time)
+    task: Follow,
+    controller: Controller,
+    starts: Starts,
+    fragments: int,
+    *,
+    worlds: Sequence[int] = (0,),
+    chooser: Chooser | None = None,
+    disturber: Disturbs | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> list[Trajectory]:
+    """Let all worlds of a task go through so many fragments, each from its state of `starts`; what some of
+    them did, with their references, which walk on from where they began. progress: called with the
+    fragments done. A world whose state has become non-finite is left out."""
+    sim, graph, model, chosen = task.sim, task.graph, task.model, list(worlds)
+    rollout = Rollout(task, controller, chooser or Ahead(), starts, disturber)
+    joint_q, body_q = [sim.joint_q[chosen]], [sim.body_q[chosen]]
+    wanted: list[np.ndarray] = []
+    at, spent, began = planar(starts.joint_q[chosen]), 0.0, time.perf_counter()
+    for step in rollout.steps(fragments):
+        spent += time.perf_counter() - began
+        joint_q.append(sim.joint_q[chosen])
+        body_q.append(sim.body_q[chosen])
+        if step == STEPS - 1:
+            rows, at = _reference(model, graph, rollout.k[chosen], at)
+            wanted.append(rows if len(wanted) == fragments - 1 else rows[:-1])
+            if progress:
+                progress(len(wanted))
+        began = time.perf_counter()
+    sound = sim.status[chosen] & NONFINITE == 0
+    moved, seen, reference = np.array(joint_q), np.array(body_q), np.concatenate(wanted)
+    return [
+        Trajectory(moved[:, w], seen[:, w], graph.timestep, reference[:, w], spent)
+        for w in np.flatnonzero(sound)
+    ]
 
 
-def _reference(model, graph: ControlGraph, k: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (STEPS + 1, nq) of fragment k begun from the planar pose `at` (1, 3), and where it leads."""
-    ends = np.stack([graph.start_q[k], graph.goal_q[k]])
-    rows = resample_q(model, ends, np.linspace(0.0, 1.0, STEPS + 1))
-    own = planar(ends)
-    turn = at[0, 2] - own[0, 2]
-    rows[:, :7] = over_ground(rows[:, :7], own[0, :2], at[0, :2], turn)
-    return rows, composed(at, relative(own[:1], own[1:]))
+def _reference(
+    model: Model, graph: ControlGraph, k: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (STEPS + 1, worlds, nq) of fragments k (worlds,) begun from the planar poses `at` (worlds, 3), and
+    where they lead."""
+    out = []
+    start, goal = planar(graph.start_q[k]), planar(graph.goal_q[k])
+    for w, fragment in enumerate(k):
+        rows = graph.rows(model, fragment)
+        rows[:, :7] = over_ground(rows[:, :7], start[w, :2], at[w, :2], at[w, 2] - start[w, 2])
+        out.append(rows)
+    return np.stack(out, axis=1), composed(at, relative(start, goal))

@@ -1,34 +1,37 @@
 """Guided SAMCON: linear feedback policies from a reference motion, by expectation maximisation (Liu et al.
 2016; P1 3.3). docs/locomotion.md derives it and says what differs from the paper.
 
-E-step, `walk`: sequential Monte Carlo along a random walk through the control graph. Particles, one world
-each, try actions drawn from the policy; after every fragment the worse part gives way to copies of the
-better. An action is worth the number of descendants it has a little later.
+E-step, `explore`: sequential Monte Carlo along random walks through the control graph. Particles, one world
+each, try actions drawn from the policy; after every fragment the worse part of an island gives way to
+copies of the better. An action is worth the number of descendants it has a little later.
 
 M-step, `improve`: weighted ridge regression of the actions that had descendants on the states they were
 taken in.
-"""
+
+Islands are walks that know nothing of each other, each with random numbers of its own: they are shared out
+among workers, and whatever their number the result is the same."""
 
 from __future__ import annotations
 
-import json
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from ..evaluate.trials import States, record_states, reference_states, run_trials
-from ..policies.linear import LinearPolicy
+from ..choose import RandomWalk
+from ..evaluate.trials import Trials, record_starts, run_trials
+from ..policies.linear import Explore, LinearPolicy
+from ..rollout import Rollout
+from ..runs.stage import Context, Report, Stage
+from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
-from ..tasks.locomotion import Locomotion
+from ..tasks.locomotion import WEIGHTS, CostWeights, Locomotion, locomotion_model
+from ..workers import Workers, shares
 
-SAVE_EVERY = 5
-"""Fragments between states to go back to, and between recorded ones."""
-BACK, FARTHEST = 10, 50
-"""Fragments to go back by when all particles have fallen: the first time, and at most."""
-RETRIES = 4
-"""Times that a walk goes back before it is given up."""
+RECORD_EVERY = 5
+"""Fragments between recorded states."""
 SETTLED = 20
 """Fragments after which the states of a walk are typical of the policy."""
 
@@ -66,135 +69,163 @@ class SamconConfig:
     disturbance: Disturbance = field(default=Disturbance(push=400.0, arms=0.2, hands=18.0))
     check_every: int = 10
     """iterations between trials of the policy"""
+    trials: int = 256
+    """of a check"""
+    weights: CostWeights = field(default=WEIGHTS)
+
+
+# ----------------------------------------------------------------------------------------------- E-step
 
 
 @dataclass
-class Walk:
-    """What the E-step saw, a row per fragment."""
+class Moments:
+    """What the M-step has to know of the actions that had descendants: sums over them by fragment, which
+    add up over islands. w: descendants, s: state (S), a: action (A)."""
 
-    S: list = field(default_factory=list)
-    """states (particles, 18)"""
-    A: list = field(default_factory=list)
-    """actions (particles, 11) [rad]"""
-    k: list = field(default_factory=list)
-    """fragments (particles,)"""
-    E: list = field(default_factory=list)
-    """costs (particles,)"""
-    parent: list = field(default_factory=list)
-    """which particle's copy each one is, after the fragment"""
-    states: list = field(default_factory=list)
-    """(row, k, joint_q, joint_qd) of the best particle of each island, now and then"""
-    falls: int = 0
-    """islands that lost all particles"""
-    retreats: int = 0
-    """times that all did"""
-    whole: bool = False
-    """The walk came to its end."""
+    w: np.ndarray
+    """(fragments,)"""
+    ww: np.ndarray
+    """(fragments,)"""
+    s: np.ndarray
+    """(fragments, S) of w s"""
+    a: np.ndarray
+    """(fragments, A)"""
+    ss: np.ndarray
+    """(fragments, S, S)"""
+    sa: np.ndarray
+    """(fragments, S, A)"""
+    aa: np.ndarray
+    """(fragments, A) of w a^2"""
 
-    def __len__(self) -> int:
-        return len(self.S)
+    @staticmethod
+    def of(S: np.ndarray, A: np.ndarray, k: np.ndarray, W: np.ndarray, fragments: int) -> Moments:
+        """From samples: states S (n, S), actions A (n, A), fragments k (n,), descendants W (n,)."""
+        n, m = S.shape[1], A.shape[1]
+        shapes = ((), (), (n,), (m,), (n, n), (n, m), (m,))
+        out = Moments(*(np.zeros((fragments, *shape)) for shape in shapes))
+        used = W > 0
+        S, A, k, W = S[used], A[used], k[used], W[used].astype(float)
+        for i in np.unique(k):
+            s, a, w = (x[k == i] for x in (S, A, W))
+            ws, wa = w[:, None] * s, w[:, None] * a
+            parts = w.sum(), w @ w, ws.sum(axis=0), wa.sum(axis=0), ws.T @ s, ws.T @ a, np.sum(wa * a, axis=0)
+            for total, part in zip(vars(out).values(), parts):
+                total[i] = part
+        return out
 
-    def add(self, S, A, k, E, parent) -> None:
-        for rows, values in zip((self.S, self.A, self.k, self.E, self.parent), (S, A, k, E, parent)):
-            rows.append(values)
-
-    def cut(self, row: int) -> None:
-        """Forget everything from a row on."""
-        for rows in (self.S, self.A, self.k, self.E, self.parent):
-            del rows[row:]
-        self.states = [state for state in self.states if state[0] < row]
-
-
-class Trail:
-    """States of a walk to go back to."""
-
-    def __init__(self, task: Locomotion):
-        self._task, self._saved, self._back, self._failed = task, [], BACK, 0
-
-    def mark(self, row: int, k: np.ndarray, felt: np.ndarray) -> None:
-        """A fragment begins."""
-        if row > self._failed:
-            self._back = BACK
-        if row % SAVE_EVERY == 0:
-            oldest = -(FARTHEST // SAVE_EVERY)
-            self._saved = [*self._saved[oldest:], (row, self._task.sim.snapshot(), k, felt)]
-
-    def retreat(self, row: int) -> tuple[int, np.ndarray, np.ndarray]:
-        """Go back from a row, farther each time until it has been passed; row, k and what is felt there."""
-        self._failed = max(self._failed, row)
-        while len(self._saved) > 1 and self._saved[-1][0] > row - self._back:
-            self._saved.pop()
-        self._back = min(2 * self._back, FARTHEST)
-        row, snapshot, k, felt = self._saved.pop()
-        self._task.sim.restore(snapshot)
-        return row, k, felt
+    def __add__(self, other: Moments) -> Moments:
+        return Moments(*(x + y for x, y in zip(vars(self).values(), vars(other).values())))
 
 
-def walk(task: Locomotion, policy: LinearPolicy, config: SamconConfig, starts: States, random) -> Walk:
-    """E-step: particles along a random walk, as many islands as have starts."""
-    islands, particles = len(starts), config.particles
-    k = np.repeat(starts.k, particles)
-    felt = task.reset(k, *(np.repeat(x, particles, axis=0) for x in (starts.joint_q, starts.joint_qd)))
-    disturber = Disturber(config.disturbance, task, random, group=particles)
-    seen, trail = Walk(), Trail(task)
-    while len(seen) < config.walk:
-        row = len(seen)
-        trail.mark(row, k, felt)
-        disturber.apply()
-        s = task.state(felt, k)
-        a = policy.sample(s, k, random)
-        felt = task.advance(k, a)
-        E = task.cost(felt, k)
-        parent, fallen = select(E.reshape(islands, -1), config.keep, random)
-        seen.falls += fallen
-        if fallen == islands:
-            seen.retreats += 1
-            if seen.retreats > RETRIES:
-                break
-            row, k, felt = trail.retreat(row)
-            seen.cut(row)
-            continue
-        seen.add(s, a, k, E, parent)
-        task.sim.copy_worlds(parent)
-        felt = felt[parent]
-        k = np.repeat(task.graph.follow(k[parent][::particles], random), particles)
-        if row % SAVE_EVERY == SAVE_EVERY - 1:
-            best = np.arange(islands) * particles + np.argmin(E[parent].reshape(islands, -1), axis=1)
-            seen.states.append((row, k[best], task.sim.joint_q[best], task.sim.joint_qd[best]))
-    task.calm()
-    seen.whole = len(seen) == config.walk
-    return seen
+@dataclass
+class Island:
+    """What one walk saw."""
+
+    moments: Moments
+    starts: Starts | None
+    """states that the policy came through and lived on from; None for none"""
+    cost: float
+    """sum over the particles that stood"""
+    stood: int
+    """of how many it is the sum"""
+    falls: int
+    """times that all particles fell, and the walk began anew"""
 
 
-def select(E: np.ndarray, keep: float, random) -> tuple[np.ndarray, int]:
-    """The particle (n,) whose copy each one becomes, and how many islands have none left; E: costs (islands,
-    particles). The best `keep` of an island stay; the others become copies of them, of the best first; an
-    island without survivors becomes like another one."""
+def explore(
+    task: Locomotion,
+    policy: LinearPolicy,
+    config: SamconConfig,
+    pool: Starts,
+    seeds: Sequence[np.random.SeedSequence],
+) -> list[Island]:
+    """E-step: an island for each seed, side by side in the worlds of the task, each from a state of the
+    pool."""
+    streams = Streams([np.random.default_rng(seed) for seed in seeds], group=config.particles)
+    starts = pool.draw(streams, config.speed_noise)
+    disturber = Disturber(config.disturbance, streams)
+    rollout = Rollout(task, Explore(policy, streams), RandomWalk(streams), starts, disturber)
+    rows, islands, P = config.walk, streams.count, config.particles
+    S, A = (np.empty((rows, islands, P, n)) for n in (task.obs, task.actions))
+    k, E, parents = (
+        np.empty((rows, islands), int),
+        np.empty((rows, islands, P)),
+        np.empty((rows, islands, P), int),
+    )
+    states: list[tuple[int, Starts]] = []
+    home = np.arange(islands)[:, None] * P
+    for fragment in rollout.fragments(rows):
+        row, cost = fragment.row, fragment.cost.reshape(islands, P)
+        parent, lost = select(cost, config.keep)
+        S[row], A[row] = fragment.obs.reshape(S[row].shape), fragment.action.reshape(A[row].shape)
+        k[row], E[row], parents[row] = fragment.k[::P], cost, np.where(lost[:, None], -1, parent)
+        rollout.become((home + parent).ravel())
+        if lost.any():
+            rollout.restart(pool.draw(streams.only(lost), config.speed_noise), np.repeat(lost, P))
+        if row % RECORD_EVERY == RECORD_EVERY - 1:
+            best = home[:, 0] + np.argmin(np.take_along_axis(cost, parent, axis=1), axis=1)
+            after = rollout.chooser.next(task.graph, fragment.k)[best]
+            states.append((row, Starts(after, task.sim.joint_q[best], task.sim.joint_qd[best])))
+    return [
+        _island(config, task.graph.count, S[:, i], A[:, i], k[:, i], E[:, i], parents[:, i], _own(states, i))
+        for i in range(islands)
+    ]
+
+
+def _own(states: list[tuple[int, Starts]], i: int) -> list[tuple[int, Starts]]:
+    """Those of one island."""
+    own = slice(i, i + 1)
+    return [(row, Starts(s.k[own], s.joint_q[own], s.joint_qd[own])) for row, s in states]
+
+
+def _island(
+    config: SamconConfig, fragments: int, S: np.ndarray, A: np.ndarray, k: np.ndarray, E: np.ndarray,
+    parents: np.ndarray, states: list[tuple[int, Starts]],
+) -> Island:  # fmt: skip
+    """What one island saw, in arrays with a row per fragment."""
+    W, each = descendants(parents, config.lag), np.repeat(k, config.particles)
+    moments = Moments.of(S.reshape(len(each), -1), A.reshape(len(each), -1), each, W.ravel(), fragments)
+    rows, lost = np.arange(len(k)), parents[:, 0] < 0
+    age = rows - np.maximum.accumulate(np.where(lost, rows, -1))
+    lives = np.array([not lost[row : row + config.lag].any() for row in rows]) & (
+        rows < len(rows) - config.lag
+    )
+    typical = [s for row, s in states if age[row] >= SETTLED and lives[row]]
+    starts, stood = Starts.joined(typical) if typical else None, np.isfinite(E)
+    return Island(moments, starts, float(E[stood].sum()), int(stood.sum()), int(lost.sum()))
+
+
+def select(E: np.ndarray, keep: float) -> tuple[np.ndarray, np.ndarray]:
+    """The particle (islands, particles) of its island whose copy each one becomes, and which islands
+    (islands,) have none left; E: costs (islands, particles). The best `keep` of an island stay; the others
+    become copies of them, of the best first."""
     islands, particles = E.shape
     order = np.argsort(E, axis=1, kind="stable")
     alive = np.minimum(np.isfinite(E).sum(axis=1), max(1, round(keep * particles)))
-    lost = np.flatnonzero(alive == 0)
-    home = np.arange(islands)
-    if len(lost) < islands:
-        home[lost] = random.choice(np.flatnonzero(alive), len(lost))
-    child = np.arange(particles) % np.maximum(alive[home], 1)[:, None]
+    child = np.arange(particles) % np.maximum(alive, 1)[:, None]
     parent = np.empty((islands, particles), int)
-    parent[np.arange(islands)[:, None], order] = home[:, None] * particles + order[home[:, None], child]
-    return parent.ravel(), len(lost)
+    np.put_along_axis(parent, order, np.take_along_axis(order, child, axis=1), axis=1)
+    return parent, alive == 0
 
 
-def descendants(parent: list, lag: int, end: int) -> list[np.ndarray]:
-    """For each of the first `end` rows, how many particles `lag` rows later descend from each one."""
-    counts = []
-    for row in range(end):
-        line = np.arange(len(parent[0]))
-        for later in reversed(parent[row : row + lag + 1]):
+def descendants(parent: np.ndarray, lag: int) -> np.ndarray:
+    """How many particles `lag` rows later descend from each one (rows, particles), or at the end, for the
+    last rows. parent: (rows, particles), whose copy each one is after its row; -1: the walk began anew."""
+    rows, particles = parent.shape
+    nobody = np.concatenate([parent, np.full((rows, 1), -1)], axis=1)
+    counts = np.zeros((rows, particles), int)
+    for row in range(rows):
+        line = np.arange(particles)
+        for later in nobody[row : row + lag + 1][::-1]:
             line = later[line]
-        counts.append(np.bincount(line, minlength=len(line)))
+        counts[row] = np.bincount(line[line >= 0], minlength=particles)
     return counts
 
 
-def improve(policy: LinearPolicy, seen: Walk, config: SamconConfig, feedback: bool) -> LinearPolicy:
+# ----------------------------------------------------------------------------------------------- M-step
+
+
+def improve(policy: LinearPolicy, seen: Moments, config: SamconConfig, feedback: bool) -> LinearPolicy:
     """M-step: the policy that makes the actions with descendants likely, near the old one.
 
     With weights w that sum to one, means s_, a_ and residuals about them, M solves
@@ -203,41 +234,37 @@ def improve(policy: LinearPolicy, seen: Walk, config: SamconConfig, feedback: bo
     a_hat moves.
     """
     new = policy.copy()
-    end = len(seen) if seen.whole else max(len(seen) - config.lag, 0)
-    if end == 0:
-        return new
-    W = np.concatenate(descendants(seen.parent, config.lag, end))
-    used = W > 0
-    S, A, ks = (np.concatenate(rows[:end])[used] for rows in (seen.S, seen.A, seen.k))
-    W = W[used].astype(float)
-    for k in np.unique(ks):
-        s, a, w = (x[ks == k] for x in (S, A, W))
-        w = w / w.sum()
-        n = 1.0 / np.sum(w**2)
-        mean_s, mean_a = w @ s, w @ a
+    for k in np.flatnonzero(seen.w):
+        w = seen.w[k]
+        n = w**2 / seen.ww[k]
+        mean_s, mean_a = seen.s[k] / w, seen.a[k] / w
         if not feedback:
             new.a_hat[k] += n / (n + 5.0) * (mean_a - policy.a_hat[k])
             continue
-        s, a = s - mean_s, a - mean_a
-        pull = (config.ridge + config.doubt / n) * np.eye(s.shape[1])
-        new.M[k] += np.linalg.solve((s.T * w) @ s + pull, (s.T * w) @ (a - s @ policy.M[k].T)).T
+        ss = seen.ss[k] / w - np.outer(mean_s, mean_s)
+        sa = seen.sa[k] / w - np.outer(mean_s, mean_a)
+        aa = seen.aa[k] / w - mean_a**2
+        pull = (config.ridge + config.doubt / n) * np.eye(len(ss))
+        new.M[k] += np.linalg.solve(ss + pull, sa - ss @ policy.M[k].T).T
         new.a_hat[k] = mean_a - new.M[k] @ mean_s
-        spread = w @ (a - s @ new.M[k].T) ** 2
+        M = new.M[k]
+        spread = aa - 2.0 * np.sum(M * sa.T, axis=1) + np.sum(M @ ss * M, axis=1)
+        spread = np.maximum(spread, 0.0)
         new.sigma[k] = np.sqrt(np.maximum(0.5 * policy.sigma[k] ** 2 + 0.5 * spread, config.least_sigma**2))
     return new
 
 
+# ---------------------------------------------------------------------------------------------- learning
+
+
 @dataclass
-class Progress:
+class Progress(Report):
     """One iteration in numbers."""
 
-    iteration: int
     cost: float
     """mean over the particles that stand"""
-    length: int
-    """fragments of the walk"""
     falls: int
-    """islands that lost all particles"""
+    """times that an island lost all particles"""
     sigma: float
     """[rad] mean exploration"""
     score: float
@@ -247,119 +274,180 @@ class Progress:
     samples_per_second: float
     """fragments simulated per second of everything"""
     outside: float
-    """share of the time that is not simulation"""
+    """share of the workers' time that is not simulation"""
 
 
 class Samcon:
-    """Learns a policy for a task; everything that its future depends on is in `saved`."""
+    """Learns a policy; everything that its future depends on is in `state`. tasks: where the islands walk,
+    shared out evenly, and where policies are tried, one for each worker."""
 
-    def __init__(self, task: Locomotion, trial_task: Locomotion, config: SamconConfig, seed: int = 0):
-        if task.sim.world_count != config.islands * config.particles:
+    def __init__(
+        self,
+        tasks: Sequence[Locomotion],
+        trial_tasks: Sequence[Locomotion],
+        config: SamconConfig,
+        seed: int = 0,
+    ):
+        if sum(task.worlds for task in tasks) != config.islands * config.particles:
             raise ValueError(
-                f"the task needs {config.islands * config.particles} worlds, a world per particle"
+                f"the tasks need {config.islands * config.particles} worlds, a world per particle"
             )
-        self.task, self.trial_task, self.config, self.seed = task, trial_task, config, seed
-        self.random = np.random.default_rng(seed)
-        self.policy = task.open_loop(config.sigma)
+        self.tasks, self.trial_tasks, self.config, self.seed = list(tasks), list(trial_tasks), config, seed
+        self.workers = Workers(len(self.tasks))
+        graph = self.tasks[0].graph
+        self.policy = LinearPolicy.zero(graph.count, self.tasks[0].actions, self.tasks[0].obs, config.sigma)
         self.mean = self.policy.copy()
         self.best = self.policy.copy()
         self.best_score = -np.inf
         self.iteration = 0
-        self.states = reference_states(task.graph)
-        self.best_states = self.states
+        self.starts = reference_starts(graph)
+        self.best_starts = self.starts
+
+    @property
+    def done(self) -> bool:
+        return self.iteration >= self.config.iterations
 
     def iterate(self) -> Progress:
         """One E-step and M-step; the policies are tried now and then."""
         began, before = time.perf_counter(), self._spent
         c = self.config
-        starts = self.states.draw(c.islands, self.random, c.speed_noise)
-        seen = walk(self.task, self.policy, c, starts, self.random)
+        islands = self._explore()
         feedback = self.iteration >= c.open_loop
-        self.policy = improve(self.policy, seen, c, feedback)
+        self.policy = improve(self.policy, _total([i.moments for i in islands]), c, feedback)
         self.mean = self.policy.moved(self.mean, c.average if feedback else 0.0)
-        if seen.whole:
-            self._record(seen)
+        if found := [island.starts for island in islands if island.starts is not None]:
+            self.starts = Starts.joined(found)
         self.iteration += 1
         survived = np.nan
-        if self.iteration % c.check_every == 0 or self.iteration == c.iterations:
+        if self.iteration % c.check_every == 0 or self.done:
             survived = self.check()
-        E = np.concatenate(seen.E) if len(seen) else np.zeros(0)
         seconds = time.perf_counter() - began
         samples, simulating = np.subtract(self._spent, before) / seconds
+        stood = sum(island.stood for island in islands)
         return Progress(
             iteration=self.iteration,
-            cost=float(E[np.isfinite(E)].mean()) if np.isfinite(E).any() else np.nan,
-            length=len(seen),
-            falls=seen.falls,
+            fresh=bool(np.isfinite(survived)),
+            cost=sum(island.cost for island in islands) / stood if stood else np.nan,
+            falls=sum(island.falls for island in islands),
             sigma=float(self.policy.sigma.mean()),
             score=float(self.best_score),
             survived=survived,
             samples_per_second=float(samples),
-            outside=float(1.0 - simulating),
+            outside=float(1.0 - simulating / len(self.tasks)),
         )
+
+    def _explore(self) -> list[Island]:
+        """All islands, in their order."""
+        seeds = np.random.SeedSequence((self.seed, self.iteration)).spawn(self.config.islands)
+        shares, first = [], 0
+        for task in self.tasks:
+            count = task.worlds // self.config.particles
+            shares.append((task, self.policy, self.config, self.starts, seeds[first : first + count]))
+            first += count
+        return [island for share in self.workers.each(explore, shares) for island in share]
 
     @property
     def _spent(self) -> tuple[float, float]:
-        """Fragments simulated so far, and the seconds that the simulation took."""
-        tasks = self.task, self.trial_task
+        """Fragments simulated so far, and the seconds that the workers' simulations took."""
+        tasks = {id(task): task for task in (*self.tasks, *self.trial_tasks)}.values()
         return sum(task.samples for task in tasks), sum(task.simulating for task in tasks)
-
-    def _record(self, seen: Walk) -> None:
-        """Take states that the policy comes through as the starts of the next walks."""
-        rows = [s for s in seen.states if SETTLED <= s[0] < len(seen) - self.config.lag]
-        if rows:
-            self.states = States(*(np.concatenate(part) for part in list(zip(*rows))[1:]))
 
     def check(self) -> float:
         """Try the policy and its running mean under disturbances, and keep the best so far; the share of
         trials that the policy lasted. The score is the share of the trials' time that was survived, less a
         hundredth of the cost."""
-        survived = 0.0
-        for policy in (self.mean, self.policy):
-            trials = run_trials(
-                self.trial_task,
+        survived, tried = 0.0, [self.mean, self.policy]
+        jobs = [
+            (
+                self.trial_tasks[i % len(self.trial_tasks)],
                 policy,
-                self.states,
-                cycles=20,
-                seed=self.seed,
-                speed_noise=self.config.speed_noise,
-                disturbance=self.config.disturbance,
+                self.starts,
+                self.config,
+                self.seed,
+                self.best_score,
             )
-            score = trials.lived.mean() - 0.01 * trials.cost if trials.lived.any() else -1.0
+            for i, policy in enumerate(tried)
+        ]
+        for policy, (trials, score, starts) in zip(tried, self.workers.each(_try, jobs)):
             survived = float(trials.survived.mean())
-            if score > self.best_score:
-                self.best, self.best_score = policy.copy(), score
-                unpushed = replace(self.config.disturbance, push=0.0)
-                self.best_states = record_states(self.trial_task, policy, self.states, self.seed, unpushed)
+            if starts is not None and score > self.best_score:
+                self.best, self.best_score, self.best_starts = policy.copy(), score, starts
         return survived
 
-    def learn(self, progress: Callable[[Progress], None] | None = None) -> LinearPolicy:
-        """Iterate to the end; the best policy."""
-        while self.iteration < self.config.iterations:
-            report = self.iterate()
-            if progress:
-                progress(report)
-        return self.best
+    @property
+    def result(self) -> dict[str, np.ndarray] | None:
+        """The best policy and the states to start it from, by name; None before the first check."""
+        if not np.isfinite(self.best_score):
+            return None
+        return self.best.arrays | {f"states.{name}": v for name, v in vars(self.best_starts).items()}
 
     @property
-    def saved(self) -> dict[str, np.ndarray]:
-        """Arrays by name, from which `resume` goes on exactly as this object would."""
+    def state(self) -> dict[str, np.ndarray]:
+        """Arrays by name, from which `restore` goes on exactly as this object would."""
         policies = {"policy": self.policy, "mean": self.mean, "best": self.best}
-        arrays = {f"{name}.{x}": v for name, p in policies.items() for x, v in vars(p).items()}
-        states = {"states": self.states, "best_states": self.best_states}
-        arrays |= {f"{name}.{x}": v for name, s in states.items() for x, v in vars(s).items()}
-        random = json.dumps(self.random.bit_generator.state)
-        return arrays | {
-            "iteration": np.array(self.iteration),
-            "best_score": np.array(self.best_score),
-            "random": np.array(random),
-        }
+        arrays = {f"{name}.{x}": v for name, p in policies.items() for x, v in p.arrays.items()}
+        starts = {"starts": self.starts, "best_starts": self.best_starts}
+        arrays |= {f"{name}.{x}": v for name, s in starts.items() for x, v in vars(s).items()}
+        return arrays | {"iteration": np.array(self.iteration), "best_score": np.array(self.best_score)}
 
-    def resume(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what was `saved`."""
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what `state` was."""
         for name in ("policy", "mean", "best"):
-            setattr(self, name, LinearPolicy(*(state[f"{name}.{f.name}"] for f in fields(LinearPolicy))))
-        for name in ("states", "best_states"):
-            setattr(self, name, States(*(state[f"{name}.{f.name}"] for f in fields(States))))
+            read = LinearPolicy(*(state[f"{name}.{f.name}"] for f in fields(LinearPolicy)))
+            if read.M.shape != self.policy.M.shape:
+                raise ValueError(f"{name}.M has the shape {read.M.shape}")
+            setattr(self, name, read)
+        for name in ("starts", "best_starts"):
+            setattr(self, name, Starts(*(state[f"{name}.{f.name}"] for f in fields(Starts))))
         self.iteration, self.best_score = int(state["iteration"]), float(state["best_score"])
-        self.random.bit_generator.state = json.loads(str(state["random"]))
+
+
+def _try(
+    task: Locomotion, policy: LinearPolicy, starts: Starts, c: SamconConfig, seed: int, least: float
+) -> tuple[Trials, float, Starts | None]:
+    """Trials of a policy, its score, and where it can be started from if that is above `least`."""
+    trials = run_trials(task, policy, starts, 20, seed, c.speed_noise, c.disturbance)
+    score = float(trials.lived.mean()) - 0.01 * trials.cost if trials.lived.any() else -1.0
+    if score <= least:
+        return trials, score, None
+    return trials, score, record_starts(task, policy, starts, seed, replace(c.disturbance, push=0.0))
+
+
+def _total(parts: Sequence[Moments]) -> Moments:
+    """Their sum, in their order."""
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
+# ------------------------------------------------------------------------------------------------- stage
+
+
+def make(context: Context) -> Samcon:
+    """The learner of a graph, in worlds shared out among the workers."""
+    c: SamconConfig = context.config
+    model, count = locomotion_model(), max(1, min(context.workers, c.islands))
+    threads = None if count == 1 else max(1, (os.cpu_count() or 1) // count)
+
+    def task(worlds: int) -> Locomotion:
+        return Locomotion(model, context.graph, worlds, context.device, threads, c.weights)
+
+    tasks = [task(c.particles * islands) for islands in shares(c.islands, count)]
+    return Samcon(tasks, [task(c.trials) for _ in range(min(count, 2))], c, context.seed)
+
+
+def locomotion_task(context: Context, worlds: int) -> Locomotion:
+    return Locomotion(
+        locomotion_model(), context.graph, worlds, context.device, weights=context.config.weights
+    )
+
+
+STAGE = Stage(
+    name="locomotion",
+    about="to stay up and follow the motion, without the ball",
+    config=SamconConfig,
+    make=make,
+    controller=lambda context, arrays: LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy))),
+    task=locomotion_task,
+)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..starts import Streams
+
 
 @dataclass
 class LinearPolicy:
@@ -34,16 +36,33 @@ class LinearPolicy:
         for i in np.unique(k):
             rows = k == i
             a[rows] += s[rows] @ self.M[i].T
-        return a
-
-    def sample(self, s: np.ndarray, k: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """Actions with exploration noise."""
-        return self.act(s, k) + self.sigma[k] * random.standard_normal((len(k), self.a_hat.shape[1]))
+        return np.asarray(a)
 
     def copy(self) -> LinearPolicy:
         return LinearPolicy(self.M.copy(), self.a_hat.copy(), self.sigma.copy())
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """By name, for a file."""
+        return dict(vars(self))
 
     def moved(self, other: LinearPolicy, share: float) -> LinearPolicy:
         """This policy, moved a share of the way to another."""
         pairs = zip(vars(self).values(), vars(other).values())
         return LinearPolicy(*((1.0 - share) * mine + share * its for mine, its in pairs))
+
+
+class Explore:
+    """A policy's actions with exploration noise, drawn anew for each world; the worlds of a unit of `streams`
+    are in one fragment."""
+
+    def __init__(self, policy: LinearPolicy, streams: Streams):
+        self.policy, self.streams = policy, streams
+
+    def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
+        """Samples (n, actions) [rad] of N(pi_k(s), diag(sigma_k^2))."""
+        policy, count, group = self.policy, self.streams.count, self.streams.group
+        unit = k[::group]  # one product for each unit: its bits do not depend on how many there are
+        a = s.reshape(count, group, -1) @ policy.M[unit].transpose(0, 2, 1) + policy.a_hat[unit, None]
+        a = a + policy.sigma[unit, None] * self.streams.normal(group, a.shape[-1])
+        return np.asarray(a.reshape(count * group, -1))

@@ -61,8 +61,8 @@ def read_arrays(path: Path, remedy: str, hint: str = "") -> dict[str, np.ndarray
 
 
 def mapped(path: Path, shape: tuple[int, ...], dtype: Any = np.float32) -> np.ndarray:
-    """A file as an array, made where there is none: for what would be too large to write with every checkpoint.
-    A checkpoint says how much of it counts; what was written later is written again."""
+    """A file as an array, made where there is none: for what would be too large to write with every
+    checkpoint. A checkpoint says how much of it counts; what was written later is written again."""
     if path.exists():
         array = np.lib.format.open_memmap(path, mode="r+")
         if array.shape != shape or array.dtype != dtype:

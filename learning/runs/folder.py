@@ -173,9 +173,9 @@ class StageFolder:
     stage: Stage
 
     def config(self, asked: Any = None, iterations: int | None = None) -> Any:
-        """The stage's parameters: those asked for, else those it was begun with, else its defaults; keys that an
-        older file lacks have their defaults. iterations: in all; None for what it was begun with. Raises
-        InputError where others were asked for than it was begun with."""
+        """The stage's parameters: those asked for, else those it was begun with, else its defaults; keys
+        that an older file lacks have their defaults. iterations: in all; None for what it was begun with.
+        Raises InputError where others were asked for than it was begun with."""
         default = asked if asked is not None else self.stage.config()
         stored = self._stored()
         if stored is None:

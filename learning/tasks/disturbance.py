@@ -4,11 +4,14 @@ as another policy likes."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-HANDS = ("l_hand", "r_hand")
-PUSHED = "torso"
+from ..starts import Streams
+
+if TYPE_CHECKING:
+    from .follow import Follow
 
 
 @dataclass(frozen=True)
@@ -34,41 +37,43 @@ CALM = Disturbance()
 
 
 class Disturber:
-    """Disturbs the worlds of a `Locomotion`, fragment by fragment; `group` worlds in a row feel the same."""
+    """Disturbs the worlds of a task, fragment by fragment; the worlds of a unit of `streams` feel the same.
 
-    def __init__(self, what: Disturbance, task, random: np.random.Generator, group: int = 1):
-        self.what, self.task, self.random, self.group = what, task, random, group
-        self.count = task.sim.world_count // group
-        self._left = np.zeros(self.count, int)
-        self._push = np.zeros((self.count, 3))
-        self._hands = np.zeros((self.count, len(HANDS), 3))
-        task.calm()
+    The task's course pushes a trunk and two hands, in this order; its offsets beyond the policy's are the
+    arms'."""
 
-    def apply(self) -> None:
+    def __init__(self, what: Disturbance, streams: Streams):
+        self.what, self.streams = what, streams
+        self._left = np.zeros(streams.count, int)
+        self._forces = np.zeros((streams.count, 3, 3))
+
+    def apply(self, task: Follow) -> None:
         """Set the forces and the arms' offsets of the coming fragment."""
-        what, task, n = self.what, self.task, self.count
-        period = task.graph.period
+        what, streams, period = self.what, self.streams, task.graph.period
         if what.push:
-            self._left -= 1
-            self._push[self._left <= 0] = 0.0
-            begins = (self._left <= 0) & (self.random.random(n) < period / what.push_every)
-            angle = 2.0 * np.pi * self.random.random(n)
-            force = what.push * self.random.random(n)
-            force = np.stack([force * np.cos(angle), force * np.sin(angle), 0.0 * force], axis=1)
-            self._push[begins] = force[begins]
-            self._left[begins] = round(what.push_time / period)
-            self._force(PUSHED, self._push)
+            self._push(streams.uniform(3), period)
         if what.hands:
-            begins = self.random.random(n) < period / what.hands_time
-            force = self.random.standard_normal(self._hands.shape)
-            size = what.hands * self.random.random((n, len(HANDS), 1))
-            force *= size / np.linalg.norm(force, axis=-1, keepdims=True)
-            self._hands[begins] = force[begins]
-            for hand, name in enumerate(HANDS):
-                self._force(name, self._hands[:, hand])
+            self._pull(streams.uniform(3), streams.normal(2, 3), period)
+        if what.push or what.hands:
+            task.course.push[:] = streams.worlds(self._forces)
         if what.arms:
-            arms = what.arms * self.random.standard_normal((n, task.arm_columns))
-            task.offset[:, task.action_size :] = np.repeat(arms, self.group, axis=0)
+            arms = what.arms * streams.normal(task.course.columns - task.actions)
+            task.course.offset[:, task.actions :] = streams.worlds(arms)
 
-    def _force(self, body: str, force: np.ndarray) -> None:
-        self.task.sim.apply_force(body, np.repeat(force, self.group, axis=0))
+    def _push(self, drawn: np.ndarray, period: float) -> None:
+        """drawn (count, 3): whether a push begins, from where, how hard."""
+        what, trunk = self.what, self._forces[:, 0]
+        self._left -= 1
+        trunk[self._left <= 0] = 0.0
+        begins = (self._left <= 0) & (drawn[:, 0] < period / what.push_every)
+        angle, force = 2.0 * np.pi * drawn[:, 1], what.push * drawn[:, 2]
+        level = np.stack([force * np.cos(angle), force * np.sin(angle), 0.0 * force], axis=1)
+        trunk[begins] = level[begins]
+        self._left[begins] = round(what.push_time / period)
+
+    def _pull(self, drawn: np.ndarray, way: np.ndarray, period: float) -> None:
+        """drawn (count, 3): whether new forces begin, how large each hand's is; way (count, 2, 3): where
+        to."""
+        begins = drawn[:, 0] < period / self.what.hands_time
+        force = way * (self.what.hands * drawn[:, 1:, None] / np.linalg.norm(way, axis=-1, keepdims=True))
+        self._forces[begins, 1:] = force[begins]

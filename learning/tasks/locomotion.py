@@ -3,52 +3,25 @@ the state and the cost of Liu et al. 2016)."""
 
 from __future__ import annotations
 
-import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
-from ...sims import Model, Simulation
-from ...sims.worlds.character import (
-    ANGLE,
-    ANGULAR_MOMENTUM,
-    COM,
-    COM_VELOCITY,
-    ENDS,
-    HEIGHT,
-    LEAN,
-    RATE,
-    SPIN,
-    Character,
-)
-from ...sims.worlds.simulation import FALL, NONFINITE
+from ...sims.model import Model
+from ...sims.worlds import FALL, NONFINITE, Group, Probe, terms
 from ..graph import STEPS, ControlGraph
-from ..policies.linear import LinearPolicy
-from .disturbance import HANDS, PUSHED
+from ..starts import Starts
+from .follow import Follow
 
 FINGERS = ("*_mcp", "*_pip", "*_dip")
-STEERED = ("lower_back", "l_hip", "r_hip", "l_knee", "r_knee")
-"""Joints that a policy offsets: 11 numbers."""
-ARMS = ("l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist")
-LEGS = ("l_hip", "l_knee", "l_ankle", "l_toes", "r_hip", "r_knee", "r_ankle", "r_toes")
-JUDGED = ("lower_back", "torso", "neck", *LEGS)
-"""Joints in the pose cost; the arms belong to another policy."""
-FELT = ("l_foot", "r_foot", "head")
-"""Ends: the feet are in the state, all are in the cost."""
-STATE = (
-    (LEAN, 0.1),
-    (HEIGHT, 0.05),
-    (COM, 0.05),
-    (COM_VELOCITY, 0.3),
-    (ANGULAR_MOMENTUM, 3.0),
-    (slice(ENDS, ENDS + 6), 0.05),
-)
-"""Parts of the 18-number reduced state, and the deviation that counts as one."""
 FALLEN = 0.3
 """[m] A root this far below, or above, the reference's is out of control."""
 HEIGHT_UNIT = 1.6
 """[m] of the balance cost"""
+UNITS = {"lean": 0.1, "height": 0.05, "com": 0.05, "com_velocity": 0.3, "momentum": 3.0}
+FOOT_UNIT = 0.05
+"""Deviations that count as one in the 18-number reduced state: of the parts above and of both feet."""
 
 
 @dataclass(frozen=True)
@@ -75,95 +48,120 @@ def locomotion_model() -> Model:
     return Model.load("player", rigid=FINGERS, without=("ball",))
 
 
-class Locomotion:
-    """Worlds in which the player follows a control graph, each from fragment to fragment on its own."""
+class Locomotion(Follow):
+    """A player that keeps its balance along a control graph.
+
+    A policy offsets the lower back, hips and knees, 11 numbers; shoulders, elbows and wrists are another's,
+    here a disturbance's. It feels the 18 numbers of `observe`.
+    """
 
     def __init__(
         self,
         model: Model,
         graph: ControlGraph,
-        world_count: int,
+        worlds: int,
         device: str = "cpu",
         threads: int | None = None,
         weights: CostWeights = WEIGHTS,
     ):
-        self.model, self.graph, self.weights = model, graph, weights
-        self.sim = Simulation(model, world_count, device, threads)
-        self.character = Character(
-            self.sim, graph.targets, graph.goal_q, graph.goal_qd, FELT, JUDGED, STEERED + ARMS
+        roles = model.roles
+        hips, knees, ankles, toes = (roles.both(part) for part in ("hips", "knees", "ankles", "toes"))
+        steered = (roles.spine[0], *hips, *knees)
+        arms = (*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists"))
+        pushed = (roles.one("trunk"), *roles.both("hands"))
+        super().__init__(model, graph, worlds, device, threads, (*steered, *arms), pushed)
+        self.actions = sum(_count(model.dof_slice(name)) for name in steered)
+        self.judged = (*roles.spine, *(n for leg in zip(hips, knees, ankles, toes) for n in leg))
+        """joints in the pose cost; the arms are another's"""
+        self.ends = (*roles.both("feet"), roles.one("head"))
+        self.probe = Probe(
+            self.sim,
+            _terms(self.ends, self.judged),
+            (graph.goal_q, graph.goal_qd),
+            _groups(self.ends, weights),
         )
-        self.action_size = sum(dof.stop - dof.start for dof in map(model.dof_slice, STEERED))
-        self.arm_columns = self.character.columns - self.action_size
-        self.offset = np.zeros((world_count, self.character.columns), np.float32)
-        self.scale = np.concatenate([np.full(part.stop - part.start, unit) for part, unit in STATE])
+        self.columns = self.probe.columns
+        units = UNITS | dict.fromkeys(roles.feet, FOOT_UNIT)
+        self.scale = np.concatenate(
+            [np.full(_count(self.columns[name]), unit) for name, unit in units.items()]
+        )
+        self.obs = len(self.scale)
         self.start = self._reference(graph.start_q, graph.start_qd)
         self.goal = self._reference(graph.goal_q, graph.goal_qd)
-        self.samples = 0
-        self.simulating = 0.0
+        self.goal[:, self.columns["miss"]] = 0.0
+        self.probe.want(self.goal)
+        self.felt = np.zeros((worlds, self.probe.size), np.float32)
+        """(worlds, n) what `probe` said last"""
+        self._cost = np.zeros(worlds, np.float32)
 
-    def open_loop(self, sigma: float = 0.0) -> LinearPolicy:
-        """The policy that changes nothing, whatever the state; sigma: exploration about it [rad]."""
-        return LinearPolicy.zero(self.graph.count, self.action_size, len(self.scale), sigma)
+    def _reference(self, joint_q: np.ndarray, joint_qd: np.ndarray) -> np.ndarray:
+        """What is felt in given states."""
+        felt = []
+        for first in range(0, len(joint_q), self.worlds):
+            rows = np.minimum(np.arange(first, first + self.worlds), len(joint_q) - 1)
+            super().reset(Starts(rows, joint_q[rows], joint_qd[rows]))
+            felt.append(self.probe.read())
+        return np.concatenate(felt)[: len(joint_q)]
 
-    def _reference(self, joint_q, joint_qd) -> np.ndarray:
-        """What the character feels in given states."""
-        count, felt = self.sim.world_count, []
-        for first in range(0, len(joint_q), count):
-            q, qd = (x[first : first + count] for x in (joint_q, joint_qd))
-            worlds = np.arange(len(q))
-            self.sim.reset(worlds, q, qd)
-            felt.append(self.character.sense(0)[worlds])
-        return np.concatenate(felt)
+    def reset(self, starts: Starts, which: np.ndarray | None = None) -> None:
+        super().reset(starts, which)
+        self._feel(0)
 
-    def reset(self, k, joint_q, joint_qd) -> np.ndarray:
-        """Put every world into a state at the start of its fragment k (world_count,); what is felt there,
-        `Character.sense`."""
-        self.sim.reset(joint_q=joint_q, joint_qd=joint_qd)
-        return self.character.sense(k)
+    def observe(self, k: np.ndarray) -> np.ndarray:
+        """Reduced state s (worlds, 18): the deviation from the reference at the start of fragments k."""
+        return np.asarray((self.felt[:, : self.obs] - self.start[k, : self.obs]) / self.scale)
 
-    def calm(self) -> None:
-        """End all disturbances."""
-        self.offset[:, self.action_size :] = 0.0
-        if self.sim.forced:
-            for body in (PUSHED, *HANDS):
-                self.sim.apply_force(body, np.zeros(3))
+    def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
+        super().advance(k, action, first, count)
+        if first + count == STEPS:
+            self._feel(k)
 
-    def state(self, felt: np.ndarray, k) -> np.ndarray:
-        """Reduced state s (world_count, 18): the deviation from the reference at the start of fragments k."""
-        reference = self.start[k]
-        parts = [felt[:, part] - reference[:, part] for part, _ in STATE]
-        return np.concatenate(parts, axis=1) / self.scale
+    def judge(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """E (worlds,) of the fragments k that have just ended, infinite for who has failed: who (worlds,)
+        lies on the ground or is about to, or has left it, flung by something absurd."""
+        off = self.felt[:, self.columns["height"]][:, 0] - self.goal[k, self.columns["height"]][:, 0]
+        down = self.felt[:, self.columns["status"]][:, 0].astype(int) & (FALL | NONFINITE) != 0
+        failed = down | ~(np.abs(off) < FALLEN)
+        return np.where(failed, np.inf, self._cost), failed
 
-    def advance(self, k, action) -> np.ndarray:
-        """Simulate fragments k (world_count,) under actions (world_count, actions) [rad]; what is felt at
-        their end."""
-        began = time.perf_counter()
-        self.offset[:, : self.action_size] = action
-        self.character.step(STEPS, k * STEPS, self.offset)
-        wp.synchronize_device(self.sim.device)
-        self.simulating += time.perf_counter() - began
-        self.samples += len(self.offset)
-        return self.character.sense(k)
+    def become(self, sources: np.ndarray) -> None:
+        super().become(sources)
+        self.felt = self.felt[sources]
 
-    def cost(self, felt: np.ndarray, k) -> np.ndarray:
-        """E (world_count,) at the end of fragments k; infinite for who has fallen."""
-        w, goal = self.weights, self.goal[k]
+    def _feel(self, k: np.ndarray | int) -> None:
+        self.felt, self._cost = self.probe.judge(k)
 
-        def off(part) -> np.ndarray:
-            return np.linalg.norm(felt[:, part] - goal[:, part], axis=-1)
 
-        ends, wanted = (x[:, ENDS:].reshape(len(x), -1, 3) for x in (felt, goal))
-        height = np.abs(ends[..., 2] - wanted[..., 2]).mean(axis=1)
-        over = felt[:, None, COM] - ends - (goal[:, None, COM] - wanted)
-        over = np.linalg.norm(over[..., :2], axis=-1).mean(axis=1)
-        E = w.pose * (felt[:, ANGLE] + 0.1 * felt[:, RATE])
-        E = E + w.root * (off(LEAN) + 0.1 * off(SPIN))
-        E = E + w.ends * height
-        E = E + w.balance * over / HEIGHT_UNIT
-        E = E + w.travel * off(COM_VELOCITY)
-        return np.where(self.fallen(felt, k), np.inf, E)
+def _count(part: slice) -> int:
+    return int(part.stop - part.start)
 
-    def fallen(self, felt: np.ndarray, k) -> np.ndarray:
-        """Who (world_count,) lies on the ground or is about to; or has left it, flung by something absurd."""
-        off = felt[:, HEIGHT][:, 0] - self.goal[k, HEIGHT][:, 0]
-        return (self.sim.status & (FALL | NONFINITE) != 0) | ~(np.abs(off) < FALLEN)
+
+def _terms(ends: tuple[str, ...], judged: tuple[str, ...]) -> Mapping[str, terms.Term]:
+    """What is felt, the reduced state first."""
+    over = {f"com over {end}": terms.from_com(end) for end in ends}
+    return {
+        "lean": terms.lean(),
+        "height": terms.height(),
+        "com": terms.com(),
+        "com_velocity": terms.com_velocity(),
+        "momentum": terms.momentum(),
+        **{end: terms.point(end) for end in ends},
+        "spin": terms.spin(),
+        "miss": terms.miss(judged),
+        **over,
+        "status": terms.status(),
+    }
+
+
+def _groups(ends: tuple[str, ...], w: CostWeights) -> list[Group]:
+    """The cost: weighted distances from the reference."""
+    share = 1.0 / len(ends)
+    return [
+        Group("miss", w.pose, (0, 1)),
+        Group("miss", 0.1 * w.pose, (1, 2)),
+        Group("lean", w.root),
+        Group("spin", 0.1 * w.root),
+        *(Group(end, share * w.ends, (2, 3)) for end in ends),
+        *(Group(f"com over {end}", share * w.balance / HEIGHT_UNIT, (0, 2)) for end in ends),
+        Group("com_velocity", w.travel),
+    ]

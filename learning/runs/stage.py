@@ -1,0 +1,95 @@
+"""What a stage of learning is: a name, parameters, a learner, and what its result is good for.
+
+A new stage is one file with a `Stage` in it and a line in `methods.STAGES`; `train`, the run's folder and the
+commands know the rest from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..graph import ControlGraph
+from ..rollout import Controller
+from ..tasks.locomotion import Locomotion
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass
+class Report:
+    """One iteration in numbers; a learner's has more of them. All but `fresh` are logged."""
+
+    iteration: int
+    fresh: bool
+    """The result was tried, and is worth writing."""
+
+
+class Learner(Protocol):
+    """Learns in iterations, which `state` makes a file of and `restore` goes on from, to the bit."""
+
+    iteration: int
+
+    @property
+    def done(self) -> bool: ...
+
+    def iterate(self) -> Report:
+        """Go one iteration further."""
+        ...
+
+    @property
+    def result(self) -> Arrays | None:
+        """The best so far, by name, with states to start from as states.k, states.joint_q, states.joint_qd;
+        None where there is none yet."""
+        ...
+
+    @property
+    def state(self) -> Arrays:
+        """All that the future depends on; arrays that are never changed in place."""
+        ...
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from a `state`. Raises ValueError for one of another kind."""
+        ...
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a learner is made from."""
+
+    graph: ControlGraph
+    config: Any
+    """of the stage's kind"""
+    seed: int = 0
+    device: str = "cpu"
+    workers: int = 1
+    """how many may simulate at once; it does not change what is learned"""
+    folder: Path | None = None
+    """the stage's, for what is too large for a checkpoint, as a replay buffer (`files.mapped`)"""
+    needs: Mapping[str, Arrays] = field(default_factory=dict)
+    """results of the stages that it needs, by name"""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A way to learn something for a skill."""
+
+    name: str
+    about: str
+    """a line for a person"""
+    config: Callable[..., Any]
+    """a dataclass of parameters, each with a default; `iterations` is one"""
+    make: Callable[[Context], Learner]
+    controller: Callable[[Context, Arrays], Controller]
+    """what a result does"""
+    task: Callable[[Context, int], Locomotion]
+    """worlds in which it is tried"""
+    needs: tuple[str, ...] = ()
+    """stages whose results it starts from"""
+    save_iterations: int = 1
+    save_seconds: float = 30.0
+    """A checkpoint is written after so many iterations, or so much time, whichever comes first."""
