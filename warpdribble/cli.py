@@ -17,6 +17,7 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
 from .commands import COMMANDS, Command
+from .commands.hints import HINTS, one_line
 
 ABOUT = "Recorded motion becomes a simulated basketball player. Also: warpdribble bench."
 CHOICES: Any = reduce(or_, (Annotated[command, subcommand(name)] for name, command in COMMANDS.items()))
@@ -32,9 +33,9 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 2
     except (ValueError, OSError) as error:
-        return _complain(" ".join(str(error).split()))
+        return _complain(one_line(error))
     except FloatingPointError as error:
-        _complain(str(error))
+        _complain(f"{one_line(error)}; {HINTS['root']}")
         return 1
     except KeyboardInterrupt:
         _complain("stopped")

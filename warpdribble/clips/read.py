@@ -33,7 +33,7 @@ def read_clip(
         return read_amc(path, units, up, asf)
     if suffix == ".pt":
         if units not in (None, "m", 1, "1") or up not in (None, "z"):
-            raise ClipError(path, "a BallPlay-M clip is in metres, Z up; leave out --units and --up")
+            raise ClipError(path, "a BallPlay-M clip is in metres, Z up: say neither units nor up")
         return read_ballplay(path)
     if suffix == ".asf":
         raise ClipError(path, "is only a skeleton; give the .amc file beside it")
@@ -59,8 +59,8 @@ def read_part(
     last = motion.frame_count - 1 if last == -1 else last
     if not 0 <= first < last < motion.frame_count:
         most = motion.frame_count - 1
-        reason = f"--frames {first} {last} is not a range in it: give two rising numbers from 0 to {most}"
-        raise ClipError(path, reason if most else "it has one frame only")
+        reason = f"frames {first} to {last} are no range in it: give two rising numbers from 0 to {most}"
+        raise ClipError(path, reason if most else "it has one frame only", "frames")
     names = REPAIRS if repairs == "all" else [name.strip() for name in repairs.split(",") if name.strip()]
     motion, said = repair(motion, names)
     return motion.slice(first, last), notes + said

@@ -7,17 +7,19 @@ import math
 import re
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from ..learning.tasks.locomotion import Locomotion
-    from ..sims import Model, Simulation
+    from ..learning.tasks.follow import Follow
+
+
+Task = TypeVar("Task", bound="Follow")
 
 
 class Progress(Protocol):
     """What a long job calls with the steps done, and a note to show."""
 
-    def __call__(self, done: int, note: str = "") -> None: ...
+    def __call__(self, done: int, note: str = "", total: int | None = None) -> None: ...
 
 
 def say(line: str) -> None:
@@ -38,24 +40,13 @@ def compiling() -> Iterator[None]:
         yield
 
 
-def ready(model: Model, worlds: int, device: str) -> Simulation:
-    """A simulation that has compiled what it needs; the wait is shown."""
-    from ..sims import Simulation
-
-    with compiling():
-        sim = Simulation(model, world_count=worlds, device=device)
-        sim.step(1)
-        sim.reset()
-    return sim
-
-
-def warmed(task: Locomotion) -> Locomotion:
-    """A learning task that has compiled what it needs."""
+def warmed(task: Task) -> Task:
+    """A task that has compiled what it needs."""
     import numpy as np
 
-    worlds = np.arange(task.sim.world_count)
-    task.advance(0 * worlds, 0.0)
-    task.sim.copy_worlds(worlds)
+    worlds = np.arange(task.worlds)
+    task.advance(0 * worlds, np.zeros((task.worlds, task.actions)))
+    task.become(worlds)
     task.sim.bodies()
     return task
 
@@ -69,7 +60,9 @@ def bar(label: str, total: int) -> Iterator[Progress]:
     console = Console(stderr=True)
     with Bars(console=console, transient=True, disable=not console.is_terminal) as bars:
         task = bars.add_task(label, total=total)
-        yield lambda done, note="": bars.update(task, completed=done, description=f"{label}{note}")
+        yield lambda done, note="", total=None: bars.update(
+            task, completed=done, description=f"{label}{note}", total=total
+        )
 
 
 def quiet_warp() -> None:

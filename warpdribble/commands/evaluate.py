@@ -23,6 +23,8 @@ class Evaluate:
     """Length of a trial."""
     trials: int = 100
     """How many, each from a random state."""
+    stage: str = ""
+    """Which of the run's stages; the last that was learned when empty."""
     push: float = 0.0
     """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
     arms: float = 0.0
@@ -43,10 +45,10 @@ class Evaluate:
     """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
+        from ..learning import Disturbance, Run, run_trials
         from ..learning.evaluate.pushes import FORCES, PLAYERS, push_table
-        from ..learning.evaluate.trials import run_trials
-        from ..learning.runs.folder import Run
-        from ..learning.tasks.disturbance import Disturbance
+        from ..learning.methods import STAGES
+        from ..learning.tasks.follow import OpenLoop
 
         check_range("--cycles", self.cycles, 0.1, 1e5)
         check_range("--trials", self.trials, 1, 2**16)
@@ -55,18 +57,16 @@ class Evaluate:
         check_range("--hands", self.hands, 0.0, 1e4)
         check_range("--noise", self.noise, 0.0, 100.0)
         check_range("--seed", self.seed, 0, 2**32)
-        run = Run.load(self.folder)
+        one = Run.load(self.folder).learned(STAGES, self.stage)
         find_device(self.device)
         with compiling():
-            task = warmed(run.task(self.trials, self.device))
-        policy = run.policy
-        if self.open_loop:
-            policy = task.open_loop()
-        with bar(f"{self.trials} trials", max(1, round(self.cycles * task.graph.count))) as progress:
+            task = warmed(one.task(self.trials, self.device))
+        controller = OpenLoop(task.actions) if self.open_loop else one.controller
+        with bar(f"{self.trials} trials", max(1, round(self.cycles * task.graph.cycle))) as progress:
             trials = run_trials(
                 task,
-                policy,
-                run.states,
+                controller,
+                one.starts,
                 self.cycles,
                 self.seed,
                 self.noise,
@@ -75,12 +75,13 @@ class Evaluate:
             )
         report = {
             "run": str(self.folder),
-            "skill": run.config["skill"]["name"],
-            "iterations": run.iteration,
+            "skill": one.skill["name"],
+            "stage": one.stage.name,
+            "iterations": one.iteration,
             "open_loop": self.open_loop,
             "trials": self.trials,
             "cycles": self.cycles,
-            "seconds": self.cycles * task.graph.count * task.graph.period,
+            "seconds": self.cycles * task.graph.cycle * task.graph.period,
             "noise": self.noise,
             "push": self.push,
             "arms": self.arms,
@@ -96,7 +97,9 @@ class Evaluate:
         }
         if self.pushes:
             with bar("pushes", len(FORCES)) as progress:
-                table = push_table(run.task(PLAYERS, self.device), policy, run.states, self.seed, progress)
+                table = push_table(
+                    one.task(PLAYERS, self.device), controller, one.starts, self.seed, progress
+                )
             report["pushes"] = _table(table)
         report = without_nan(report)
         if self.format == "json":

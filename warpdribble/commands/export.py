@@ -8,7 +8,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed
-from .output import Outputs, check_outputs, say_run, write_outputs
+from .output import Outputs, check_outputs, say_trajectory, write_outputs
 
 
 @dataclass
@@ -19,35 +19,48 @@ class Export(Outputs):
     """The run, a folder that warpdribble learn wrote; or dribble-right-authored, which ships."""
     seconds: float = 20.0
     """How long, in whole fragments of 0.05 s."""
+    stage: str = ""
+    """Which of the run's stages; the last that was learned when empty."""
     push: float = 0.0
     """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
     seed: int = 0
     """Of the start and the pushes."""
 
     def run(self) -> int:
+        import numpy as np
+
+        from ..learning import Disturbance, RandomWalk, Run, Streams
         from ..learning.evaluate.record import record
-        from ..learning.runs.folder import Run
-        from ..learning.tasks.disturbance import Disturbance
-        from ..sims.reference.reference import Reference
-        from ..simulate import measure
+        from ..learning.methods import STAGES
+        from ..learning.tasks.disturbance import Disturber
+        from ..sims.errors import InputError
 
         check_range("--seconds", self.seconds, 0.05, 600.0)
         check_range("--push", self.push, 0.0, 1e4)
         check_range("--seed", self.seed, 0, 2**32)
-        run = Run.load(self.folder)
+        one = Run.load(self.folder).learned(STAGES, self.stage)
         check_outputs(self.out)
         find_device(self.device)
         with compiling():
-            task = warmed(run.task(1, self.device))
-        model = task.model
-        with bar(f"simulating {self.seconds:.1f} s", round(self.seconds / run.graph.period)) as progress:
+            task = warmed(one.task(1, self.device))
+        streams = Streams([np.random.default_rng(self.seed)])
+        fragments = max(1, round(self.seconds / one.graph.period))
+        with bar(f"simulating {self.seconds:.1f} s", fragments) as progress:
             seen = record(
-                task, run.policy, run.states, self.seconds, self.seed, Disturbance(push=self.push), progress
+                task,
+                one.controller,
+                one.starts.draw(streams),
+                fragments,
+                chooser=RandomWalk(streams),
+                disturber=Disturber(Disturbance(push=self.push), streams),
+                progress=progress,
             )
-        skill = run.config["skill"]
-        say(f"skill     {skill['name']}: {skill['description']}, learned in {run.iteration} iterations")
-        reference = Reference(seen.reference_q, model.timestep)
-        shown = measure(model, reference, seen.body_q, seen.joint_q, seen.wall_time)
-        say_run(shown, "free")
-        write_outputs(self, model, shown, f"{skill['name']}, learned", "free")
+        if not seen:
+            raise InputError("the simulation broke down (non-finite state)", hint="seed")
+        say(
+            f"skill     {one.skill['name']}: {one.skill['description']}, "
+            f"learned in {one.iteration} iterations"
+        )
+        tracking = say_trajectory(task.model, seen[0], "free")
+        write_outputs(self, task.model, seen[0], tracking, f"{one.skill['name']}, learned", "free")
         return 0

@@ -6,11 +6,17 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed
+
+if TYPE_CHECKING:
+    from ..learning import Run
+    from ..learning.runs.stage import Learner, Report, Stage
+    from ..learning.runs.train import Trained
+    from ..skills import Skill
 
 
 @dataclass
@@ -21,91 +27,129 @@ class Learn:
     """Name of a skill (warpdribble skill list), or a skill's .toml file; a cyclic one."""
     out: Path
     """Folder of the run."""
-    stage: Literal["locomotion"] = "locomotion"
-    """locomotion: to stay up and follow the motion, without the ball."""
+    stage: str = "locomotion"
+    """What to learn. locomotion: to stay up and follow the motion, without the ball."""
     seed: int = 0
     """Of everything random; the same seed gives the same policy."""
     iterations: int | None = None
     """How many in all; more than before extends a run. By default as many as usual."""
+    workers: int | None = None
+    """How many simulate at once; one for each processor core by default. It changes nothing that is
+    learned."""
     data: Path | None = None
     """Folder of recordings; else $WARPDRIBBLE_DATA, else the folder that `warpdribble fetch` fills."""
     device: str = "cpu"
     """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
-        from ..learning.runs.folder import RunConfig, RunFolder
-        from ..skills.graph import check_cyclic, skill_fields, skill_text
-        from ..skills.skill import read_skill
+        from ..learning import Run
+        from ..learning.methods import STAGES
+        from ..skills import read_skill
+        from ..skills.graph import skill_fields, skill_text
 
         check_range("--seed", self.seed, 0, 2**32)
         if self.iterations is not None:
             check_range("--iterations", self.iterations, 1, 1e6)
+        if self.workers is not None:
+            check_range("--workers", self.workers, 1, 1024)
         if self.data is not None and not self.data.is_dir():
             raise ValueError(f"--data {self.data}: no such folder")
+        if self.stage not in STAGES:
+            raise ValueError(f"--stage {self.stage}: give one of {', '.join(STAGES)}")
         one = read_skill(self.skill)
-        check_cyclic(one)
         find_device(self.device)
-        config = RunConfig(skill=skill_fields(one), seed=self.seed, stage=self.stage)
-        folder = RunFolder(self.out, config, self.iterations)
+        run = Run.begin(self.out, skill_fields(one), self.seed)
         say(f"skill     {one.name}: {one.description}")
-        graph = folder.graph(skill_text(self.skill), lambda: self._graph(one))
+        run.keep(skill_text(one), lambda: self._graph(one))
+        graph = run.graph
         say(
             f"graph     {graph.count} fragments of {graph.period:g} s, "
             f"time stretched by {100.0 * (graph.stretch - 1.0):+.1f} %"
         )
-        with compiling():
-            samcon = folder.samcon(graph, self.device)
-            warmed(samcon.task)
-        if folder.saved:
-            say(f"goes on   after {folder.saved} iterations")
-        try:
-            events = self._learn(folder, samcon)
-        except KeyboardInterrupt:
-            kept = f"saved in {self.out}, the same command goes on" if folder.saved else "nothing to save yet"
-            print(f"warpdribble: stopped after {folder.saved} iterations; {kept}", file=sys.stderr)
-            return 130
-        self._summary(folder, events)
-        return 0
+        return self._learn(run, STAGES[self.stage])
 
-    def _graph(self, one):
-        from ..skills.graph import skill_graph
+    def _graph(self, one: Skill) -> Any:
+        from ..skills import skill_graph
 
         graph, notes = skill_graph(one, self.data)
         for note in notes:
             say(f"          {note}")
         return graph
 
-    def _learn(self, folder, samcon) -> bool:
-        total, tried = samcon.config.iterations, math.nan
-        with bar("learning", total) as progress:
+    def _learn(self, run: Run, stage: Stage) -> int:
+        from ..learning.runs.train import train
+        from ..learning.workers import usual_workers
 
-            def show(report) -> None:
-                nonlocal tried
-                now = math.isfinite(report.survived)
-                tried = report.survived if now else tried
-                survived = f"{100.0 * tried:.0f} % survived, " if math.isfinite(tried) else ""
-                progress(report.iteration, f": {survived}cost {report.cost:.2f}")
-                if now and not sys.stderr.isatty():
-                    line = f"iteration {report.iteration} of {total}: {survived}cost {report.cost:.2f}"
-                    print(line, file=sys.stderr, flush=True)
+        at, shown = 0, Shown()
+        workers = self.workers or usual_workers(self.device)
+        with compiling():
+            warmed(stage.task(run.context(stage, stage.config(), self.device), 1))
 
-            if samcon.iteration:
-                progress(samcon.iteration)
-            return folder.learn(samcon, show)
+        def made(learner: Learner, config: Any) -> None:
+            nonlocal at
+            at, shown.total = learner.iteration, config.iterations
+            if at:
+                say(f"goes on   after {at} iterations")
 
-    def _summary(self, folder, events: bool) -> None:
-        from ..learning.runs.folder import POLICY
+        def progress(report: Report) -> None:
+            nonlocal at
+            at = report.iteration
+            shown.say(report)
+
+        try:
+            with bar("learning", 1) as shown.progress:
+                trained = train(
+                    run,
+                    stage,
+                    iterations=self.iterations,
+                    device=self.device,
+                    workers=workers,
+                    made=made,
+                    progress=progress,
+                )
+        except KeyboardInterrupt:
+            kept = f"saved in {self.out}, the same command goes on" if at else "nothing to save yet"
+            print(f"warpdribble: stopped after {at} iterations; {kept}", file=sys.stderr)
+            return 130
+        self._summary(run, stage, trained)
+        return 0
+
+    def _summary(self, run: Run, stage: Stage, trained: Trained) -> None:
+        from ..learning.runs.folder import RESULT
         from ..learning.runs.log import read_rows
 
-        if rows := read_rows(self.out):
-            rate = sum(row["samples_per_second"] for row in rows) / len(rows)
-            outside = sum(row["outside"] for row in rows) / len(rows)
-            tried = [row["survived"] for row in rows if math.isfinite(row["survived"])]
-            share = f"{100.0 * tried[-1]:.0f} % of the last trials survived" if tried else "not tried yet"
-            say(f"learned   {folder.saved} iterations in {rows[-1]['seconds']:.0f} s, {share}")
-            say(f"speed     {rate:.0f} samples/s, {100.0 * outside:.0f} % of the time outside the simulation")
-        if not events:
+        folder = run.stage(stage).path
+        if rows := read_rows(folder):
+            tried = [row["survived"] for row in rows if math.isfinite(row.get("survived", math.nan))]
+            share = f", {100.0 * tried[-1]:.0f} % of the last trials survived" if tried else ""
+            say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{share}")
+            if "samples_per_second" in rows[-1]:
+                rate = sum(row["samples_per_second"] for row in rows) / len(rows)
+                outside = sum(row["outside"] for row in rows) / len(rows)
+                say(
+                    f"speed     {rate:.0f} samples/s, {100.0 * outside:.0f} % of the time "
+                    "outside the simulation"
+                )
+        if not trained.has_events:
             say("          no files for TensorBoard: pip install tensorboard, and the same again")
-        if (self.out / POLICY).exists():
+        if (folder / RESULT).exists():
             say(f"next      warpdribble evaluate {self.out} --cycles 200 --trials 100")
             say(f"          warpdribble export {self.out} --seconds 20 --out take.usdc")
+
+
+class Shown:
+    """Progress of learning, as a bar, and as a line where there is no terminal."""
+
+    def __init__(self) -> None:
+        self.total, self.tried = 0, math.nan
+        self.progress: Any = None
+
+    def say(self, report: Report) -> None:
+        """Show an iteration."""
+        survived, cost = getattr(report, "survived", math.nan), getattr(report, "cost", math.nan)
+        self.tried = survived if math.isfinite(survived) else self.tried
+        parts = [f"{100.0 * self.tried:.0f} % survived"] if math.isfinite(self.tried) else []
+        text = ", ".join([*parts, f"cost {cost:.2f}"])
+        self.progress(report.iteration, f": {text}", self.total)
+        if report.fresh and not sys.stderr.isatty():
+            print(f"iteration {report.iteration} of {self.total}: {text}", file=sys.stderr, flush=True)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from .console import say
+
+if TYPE_CHECKING:
+    from ..learning.evaluate.tracking import Tracking
+    from ..sims import Model
+    from ..sims.trajectory import Trajectory
 
 
 @dataclass(kw_only=True)
@@ -34,35 +39,39 @@ def check_outputs(out: Path) -> None:
         check_writable(out.with_suffix(other), (".png", ".html"))
 
 
-def write_outputs(command: Outputs, model, run, source: str, root: str) -> None:
-    """Write all of it and say where. run: a `simulate.Run`; source: where the motion comes from; root: what
-    holds the root."""
+def write_outputs(
+    command: Outputs, model: Model, seen: Trajectory, tracking: Tracking, source: str, root: str
+) -> None:
+    """Write all of it and say where. source: where the motion comes from; root: what holds the root."""
     from .. import __version__
-    from ..takes.plots import write_plots
-    from ..takes.sheet import write_sheet
-    from ..takes.take import Take, validate, write_take
-    from ..web.page import write_replay
+    from ..takes import Take, validate, write_plots, write_sheet, write_take
+    from ..web import write_replay
 
     take = Take.of(
         model,
-        run.body_q,
+        seen.body_q.astype(float),
         fps=1.0 / model.timestep,
         notes={"creator": f"warpdribble {__version__}", "clip": source, "root": root},
     )
-    heights = {
-        label: run.body_q[:, model.body(body), 2]
-        for label, body in (("right hand", "r_hand"), ("left hand", "l_hand"))
-        if body in model.body_names
-    }
+    hands = zip(("right hand", "left hand"), model.roles.hands[::-1])
+    heights = {label: seen.body_q[:, model.body(body), 2] for label, body in hands}
     picture = command.out.with_suffix(".png")
     plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
     title = f"{source}, root {root}"
     write_take(command.out, take, skin=command.skin, joints=command.usd_joints)
-    write_sheet(picture, take, heights, run.contacts, title)
-    roots = run.root_paths(model)
-    write_plots(plots, take.fps, *roots, run.angle_error, run.position_error, run.fallen, title)
+    write_sheet(picture, take, heights, tracking.contacts, title)
+    write_plots(
+        plots,
+        take.fps,
+        tracking.root,
+        tracking.wanted_root,
+        tracking.angle_error,
+        tracking.position_error,
+        tracking.fallen,
+        title,
+    )
     if command.html:
-        write_replay(replay, take, run.contacts, title, skin=command.skin)
+        write_replay(replay, take, tracking.contacts, title, skin=command.skin)
     errors = validate(command.out)
     state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
     say(f"take      {command.out} ({len(take.body_q)} frames at {take.fps:g} fps, {state})")
@@ -71,18 +80,22 @@ def write_outputs(command: Outputs, model, run, source: str, root: str) -> None:
         say(f"replay    {replay} (open it in a browser)")
 
 
-def say_run(run, root: str) -> None:
-    """Say how it went."""
+def say_trajectory(model: Model, seen: Trajectory, root: str) -> Tracking:
+    """Say how it went, and measure it."""
     import numpy as np
 
-    fell = f", first at {run.fallen.argmax() * run.reference.timestep:.2f} s" if run.falls else ""
-    say(f"simulated {run.reference.duration:.2f} s with root {root}, {run.real_time_factor:.1f} x real time")
+    from ..learning.evaluate.tracking import track
+
+    found = track(model, seen)
+    fell = f", first at {found.fallen.argmax() * seen.timestep:.2f} s" if found.falls else ""
+    say(f"simulated {seen.duration:.2f} s with root {root}, {seen.real_time_factor:.1f} x real time")
     say(
-        f"tracking  joints {np.degrees(run.angle_error.mean()):.1f} degrees, "
-        f"bodies {100.0 * run.position_error.mean():.1f} cm off (means, fingers left out)"
+        f"tracking  joints {np.degrees(found.angle_error.mean()):.1f} degrees, "
+        f"bodies {100.0 * found.position_error.mean():.1f} cm off (means, fingers left out)"
     )
-    say(f"falls     {run.falls}{fell}")
-    if "ball on ground" in run.contacts:
-        ground = run.contacts["ball on ground"]
+    say(f"falls     {found.falls}{fell}")
+    if "ball on ground" in found.contacts:
+        ground = found.contacts["ball on ground"]
         bounces = int(np.sum(ground[1:] & ~ground[:-1]))
         say(f"ball      {bounces} bounces (put in play, not yet controlled)")
+    return found

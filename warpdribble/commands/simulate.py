@@ -1,14 +1,23 @@
-"""`warpdribble simulate` and `warpdribble demo`: a clip becomes a simulated take."""
+"""`warpdribble simulate` and `warpdribble demo`: a clip or a skill becomes a simulated take."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from .clip_input import ClipInput
-from .console import bar, check_device, check_range, compiling, quiet_warp, ready, say, warmed
-from .output import Outputs, check_outputs, say_run, write_outputs
+from .console import bar, check_device, check_range, compiling, quiet_warp, say, warmed
+from .output import Outputs, check_outputs, say_trajectory, write_outputs
+
+if TYPE_CHECKING:
+    from ..learning.rollout import Controller
+    from ..learning.starts import Starts
+    from ..learning.tasks.disturbance import Disturber
+    from ..learning.tasks.follow import Follow
+    from ..sims import Model, Reference
+    from ..sims.trajectory import Trajectory
+    from ..skills import Skill, StagedSkill
 
 LONGEST = 600.0
 """[s] of one take."""
@@ -31,16 +40,68 @@ class Simulate(ClipInput, Outputs):
     mapping: str = ""
     """Names of the skeleton's joints: cmu, ballplay, mixamo, lafan, or your own .toml file; told from the
     clip when empty."""
+    ball: bool = True
+    """The ball, as it was recorded, or inferred from the hands where it was not; --no-ball leaves it out."""
     root: Literal["free", "tracked"] = "free"
     """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too."""
     model: str = "player"
     """The player, or the path of an MJCF file with the same body names."""
 
     def run(self) -> int:
+        from ..learning.evaluate.attempts import TRIES, follow, starts
+        from ..learning.tasks.follow import OpenLoop
         from ..sims import Model
+        from ..skills import stage_skill
 
         _check(self)
-        return _simulate(self, Model.load(self.model))
+        model = Model.load(self.model)
+        one = stage_skill(model, self._skill())
+        reference = one.reference
+        say(f"skill     {one.skill.name}: {one.skill.description}, {reference.duration:.2f} s")
+        for note in one.notes:
+            say(f"          {note}")
+        _check_length(reference, self.repeat)
+        if self.repeat > 1:
+            if one.cycle is None:
+                raise ValueError(f"--repeat {self.repeat}: the skill '{one.skill.name}' is not cyclic")
+            reference = one.cycle.repeat(model, self.repeat)
+        model, reference = self._without_ball(model, one, reference)
+        tries = TRIES if one.ball is not None and reference.duration < SHORT else 1
+        with compiling():
+            task = warmed(follow(model, reference, tries, self.root, self.device))
+        begin = starts(model, reference, tries, one.ball is not None)
+        seen = _record(task, OpenLoop(), begin).first(reference.frame_count)
+        write_outputs(self, model, seen, say_trajectory(model, seen, self.root), _title(one), self.root)
+        return 0
+
+    def _skill(self) -> Skill:
+        """The skill, or the clip as one that has no file yet."""
+        from ..skills import clip_skill, is_skill, read_skill
+
+        if is_skill(self.clip):
+            one = read_skill(self.clip)
+            return one if self.ball else replace(one, ball=False)
+        reading = self.reading()
+        return clip_skill(
+            self.clip,
+            self.frames,
+            repairs=self.repair,
+            units=reading["units"],
+            up=reading["up"],
+            asf=None if self.asf is None else str(self.asf),
+            mapping=self.mapping,
+            cyclic=self.repeat > 1,
+            ball=self.ball,
+        )
+
+    def _without_ball(self, model: Model, one: StagedSkill, reference: Reference) -> tuple[Model, Reference]:
+        """The model and the motion as they are, or without the ball, where nobody plays with it."""
+        from ..sims import Model
+
+        if one.ball is not None or model.roles.ball is None:
+            return model, reference
+        bare = Model.load(self.model, without=(model.roles.ball,))
+        return bare, replace(reference, joint_q=bare.convert_q(model, reference.joint_q))
 
 
 @dataclass
@@ -55,11 +116,34 @@ class Demo(Outputs):
     """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
 
     def run(self) -> int:
-        from ..sims import Model
+        import numpy as np
+
+        from ..learning import Disturbance, Locomotion, Run, Streams, cyclic_graph
+        from ..learning.evaluate.attempts import TRIES, starts
+        from ..learning.methods import STAGES
+        from ..learning.tasks.disturbance import Disturber
+        from ..sims import Cycle, Model, authored_clip
 
         _check(self)
         check_range("--push", self.push, 0.0, 1e4)
-        return _demo(self, Model.load("player"))
+        model = Model.load("player")
+        clip = authored_clip(model, "dribble_right")
+        _check_length(clip.reference, self.repeat)
+        say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle, legs learned")
+        graph = cyclic_graph(model, Cycle(clip.reference), model.roles.both("feet"))
+        with compiling():
+            task = warmed(Locomotion(model, graph, TRIES, self.device))
+        legs = Run.load(LEARNED).learned(STAGES).controller
+        pushes = Disturber(Disturbance(push=self.push), Streams([np.random.default_rng(0)], TRIES))
+        begin = starts(model, clip.reference, TRIES, ball=True)
+        seen = _record(task, legs, begin, self.repeat * graph.cycle, pushes)
+        write_outputs(self, model, seen, say_trajectory(model, seen, "free"), "authored dribble", "free")
+        say(
+            "next      open the take in Blender (or any USD viewer); push: warpdribble demo --push 300;\n"
+            "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"
+            "          or learn one, warpdribble learn SKILL --out RUN"
+        )
+        return 0
 
 
 def _check(command: Simulate | Demo) -> None:
@@ -71,106 +155,37 @@ def _check(command: Simulate | Demo) -> None:
     check_outputs(command.out)
 
 
-def _demo(command: Demo, model) -> int:
-    import numpy as np
-
-    from ..learning.evaluate.steer import Steered
-    from ..learning.graph import cyclic_graph
-    from ..learning.runs.folder import Run
-    from ..learning.tasks.disturbance import Disturbance
-    from ..learning.tasks.locomotion import Locomotion
-    from ..sims.authored.dribble import dribble_right
-    from ..sims.reference.reference import Cycle
-    from ..simulate import TRIES, ball_in_reference
-
-    clip = dribble_right(model)
-    _check_length(clip.reference, command.repeat)
-    cycle = Cycle(clip.reference)
-    reference = cycle.repeat(model, command.repeat)
-    ball = ball_in_reference(model, reference)
-    say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle, legs learned")
-    with compiling():
-        task = warmed(Locomotion(model, cyclic_graph(model, cycle), TRIES, command.device))
-    start, random = np.zeros(TRIES, int), np.random.default_rng(0)
-    pushed = Disturbance(push=command.push)
-    legs = Steered(task, Run.load(LEARNED).policy, start, random, pushed)
-    _finish(command, task.sim, reference, ball, "authored dribble", "free", legs.step)
-    say(
-        "next      open the take in Blender (or any USD viewer); push: warpdribble demo --push 300;\n"
-        "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"
-        "          or learn one, warpdribble learn SKILL --out RUN"
-    )
-    return 0
-
-
-def _simulate(command: Simulate, model) -> int:
-    from ..sims.reference.reference import close_cycle
-    from ..simulate import ball_from_hand, dribbling_hand, load_clip
-    from ..skills.skill import is_skill
-
-    if is_skill(command.clip):
-        return _simulate_skill(command, model)
-    reference, notes = load_clip(model, mapping=command.mapping, **command.reading())
-    _check_length(reference, command.repeat)
-    first, last = command.frames
-    part = f"frames {first} to {'the last' if last < 0 else last}"
-    say(f"clip      {command.clip}, {part}, {reference.duration:.2f} s")
-    for note in notes:
-        say(f"          {note}")
-    if command.repeat > 1:
-        cycle = close_cycle(model, reference)
-        reference = cycle.repeat(model, command.repeat)
-        say(f"          its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
-    ball = None
-    if "ball" in model.body_names:
-        ball = ball_from_hand(model, reference, dribbling_hand(model, reference))
-    sim = _sim(command, model, reference, ball)
-    _finish(command, sim, reference, ball, f"{command.clip.name}, {part}", command.root)
-    return 0
-
-
-def _simulate_skill(command: Simulate, model) -> int:
-    from ..simulate import ball_in_reference
-    from ..skills.skill import read_skill
-    from ..skills.staged import stage_skill
-
-    one = stage_skill(model, read_skill(command.clip))
-    reference = one.reference
-    say(f"skill     {one.skill.name}: {one.skill.description}, {reference.duration:.2f} s")
-    for note in one.notes:
-        say(f"          {note}")
-    _check_length(reference, command.repeat)
-    if command.repeat > 1:
-        if one.cycle is None:
-            raise ValueError(f"--repeat {command.repeat}: the skill '{one.skill.name}' is not cyclic")
-        reference = one.cycle.repeat(model, command.repeat)
-    has_ball = one.ball is not None and "ball" in model.body_names
-    ball = ball_in_reference(model, reference) if has_ball else None
-    sim = _sim(command, model, reference, ball)
-    _finish(command, sim, reference, ball, f"skill {one.skill.name}", command.root)
-    return 0
-
-
-def _check_length(reference, repeat: int) -> None:
+def _check_length(reference: Reference, repeat: int) -> None:
     """Raise ValueError where a take would not fit into memory."""
     most = max(1, int(LONGEST / reference.duration))
     if repeat > most:
         raise ValueError(f"--repeat {repeat}: at most {most} for this clip ({LONGEST:.0f} s)")
 
 
-def _finish(command: Outputs, sim, reference, ball, source: str, root: str, step=None) -> None:
-    """Simulate, say how it went, and write the take and its picture."""
-    from ..simulate import simulate
-
-    with bar(f"simulating {reference.duration:.1f} s", reference.frame_count) as progress:
-        run = simulate(sim, reference, root, ball, progress, step)
-    say_run(run, root)
-    write_outputs(command, sim.model, run, source, root)
+def _title(one: StagedSkill) -> str:
+    return one.skill.description if one.skill.is_clip else f"skill {one.skill.name}"
 
 
-def _sim(command: Simulate, model, reference, ball):
-    """Worlds enough for the starts that are tried."""
-    from ..simulate import TRIES
+def _record(
+    task: Follow,
+    controller: Controller,
+    begin: Starts,
+    fragments: int | None = None,
+    disturber: Disturber | None = None,
+) -> Trajectory:
+    """Simulate all worlds of a task along its graph; the one whose ball is in play longest."""
+    from ..learning.evaluate.attempts import longest_in_play
+    from ..learning.evaluate.record import record
 
-    tries = TRIES if ball is not None and reference.duration < SHORT else 1
-    return ready(model, tries, command.device)
+    count = fragments or task.graph.count
+    with bar(f"simulating {count * task.graph.period:.1f} s", count) as progress:
+        seen = record(
+            task,
+            controller,
+            begin,
+            count,
+            worlds=range(task.worlds),
+            disturber=disturber,
+            progress=progress,
+        )
+    return longest_in_play(task.model, seen)

@@ -19,12 +19,15 @@ import numpy as np
 
 from ..learning.evaluate.pushes import DIRECTIONS, PLAYERS, push_table
 from ..learning.evaluate.trials import Trials, run_trials
-from ..learning.policies.linear import LinearPolicy
-from ..learning.runs.folder import CONFIG, Run
+from ..learning.methods import STAGES
+from ..learning.rollout import Controller
+from ..learning.runs.folder import RUN, Run
 from ..learning.runs.log import read_rows
 from ..learning.tasks.disturbance import CALM, Disturbance
+from ..learning.tasks.follow import OpenLoop
 from .markers import check_page, write_measured
 
+STAGE = "locomotion"
 TRIALS, CYCLES, NOISE = 100, 200, 0.15
 BUSY = Disturbance(arms=0.2, hands=18.0)
 CURVES = "locomotion-curves.png"
@@ -36,24 +39,25 @@ Measured = dict[str, Any]
 
 def measure(folder: Path) -> Measured:
     """One run in numbers."""
-    run, rows = Run.load(folder), read_rows(folder)
-    kept = folder / MEASURED
+    run = Run.load(folder).learned(STAGES, STAGE)
+    rows, kept = read_rows(folder / STAGE), folder / MEASURED
     if kept.exists() and json.loads(kept.read_text())["iterations"] == run.iteration:
-        return json.loads(kept.read_text())
+        return dict(json.loads(kept.read_text()))
     task = run.task(TRIALS)
-    blind = task.open_loop()
+    blind = OpenLoop(task.actions)
 
-    def tried(policy: LinearPolicy, cycles: float, disturbance: Disturbance = CALM) -> Trials:
-        return run_trials(task, policy, run.states, cycles, 1, NOISE, disturbance)
+    def tried(policy: Controller, cycles: float, disturbance: Disturbance = CALM) -> Trials:
+        return run_trials(task, policy, run.starts, cycles, 1, NOISE, disturbance)
 
-    calm, busy, still = tried(run.policy, CYCLES), tried(run.policy, CYCLES, BUSY), tried(blind, 5)
-    pushes = push_table(run.task(PLAYERS), run.policy, run.states, seed=1)
+    learned = run.controller
+    calm, busy, still = tried(learned, CYCLES), tried(learned, CYCLES, BUSY), tried(blind, 5)
+    pushes = push_table(run.task(PLAYERS), learned, run.starts, seed=1)
     found = {
-        "skill": run.config["skill"]["name"],
-        "description": run.config["skill"]["description"],
-        "seed": run.config["seed"],
+        "skill": run.skill["name"],
+        "description": run.skill["description"],
+        "seed": run.run.seed,
         "iterations": run.iteration,
-        "fragments": run.graph.count,
+        "fragments": run.graph.cycle,
         "seconds": rows[-1]["seconds"],
         "rate": np.mean([row["samples_per_second"] for row in rows]),
         "outside": 100 * np.mean([row["outside"] for row in rows]),
@@ -65,7 +69,7 @@ def measure(folder: Path) -> Measured:
         "turn": math.degrees(calm.turn),
         "open angle": math.degrees(still.angle_error),
         "open ends": 100 * still.end_error,
-        "open seconds": 5 * run.graph.count * run.graph.period * still.lived.mean(),
+        "open seconds": 5 * run.graph.cycle * run.graph.period * still.lived.mean(),
         "open survived": int(still.survived.sum()),
         "pushes": pushes.largest().tolist(),
     }
@@ -146,14 +150,14 @@ def draw_curves(folders: list[Path], out: Path) -> None:
 
     skills: dict[str, list[Path]] = {}
     for folder in folders:
-        skills.setdefault(Run.load(folder).config["skill"]["name"], []).append(folder)
+        skills.setdefault(Run.load(folder).info["skill"]["name"], []).append(folder)
     columns = min(3, len(skills))
     shape = (-(-len(skills) // columns), columns)
     figure = Figure(figsize=(3.4 * columns, 2.4 * shape[0]), dpi=110, layout="constrained")
     axes = figure.subplots(*shape, squeeze=False, sharey=True)
     for ax, (name, runs) in zip(axes.flat, skills.items()):
         for folder in runs:
-            rows = [row for row in read_rows(folder) if math.isfinite(row["survived"])]
+            rows = [row for row in read_rows(folder / STAGE) if math.isfinite(row["survived"])]
             ax.plot([row["seconds"] for row in rows], [100 * row["survived"] for row in rows], ".-", lw=1)
         ax.set_title(name, fontsize=9)
         ax.set_ylim(0, 100)
@@ -170,9 +174,9 @@ def draw_curves(folders: list[Path], out: Path) -> None:
 def main(folder: Path, page: Path) -> None:
     check_page(page)
     parts = []
-    below = sorted(path for path in folder.iterdir() if path.is_dir() and not (path / CONFIG).exists())
+    below = sorted(path for path in folder.iterdir() if path.is_dir() and not (path / RUN).exists())
     for place in (folder, *below):
-        folders = sorted(path.parent for path in place.glob(f"*/{CONFIG}"))
+        folders = sorted(path.parent for path in place.glob(f"*/{RUN}"))
         runs = []
         for one in folders:
             runs.append(measure(one))

@@ -6,13 +6,15 @@ from ..lazy import lazily
 
 if TYPE_CHECKING:
     from .graph import skill_graph
-    from .skill import Skill, SkillError, parse_skill, read_skill, skill_names
+    from .skill import Skill, SkillError, clip_skill, is_skill, parse_skill, read_skill, skill_names
     from .staged import StagedSkill, stage_skill
 
 __all__ = [
     "Skill",
     "SkillError",
     "StagedSkill",
+    "clip_skill",
+    "is_skill",
     "parse_skill",
     "read_skill",
     "skill_graph",
@@ -24,7 +26,7 @@ __getattr__, __dir__ = lazily(
     __name__,
     {
         ".graph": "skill_graph",
-        ".skill": "Skill SkillError parse_skill read_skill skill_names",
+        ".skill": "Skill SkillError clip_skill is_skill parse_skill read_skill skill_names",
         ".staged": "StagedSkill stage_skill",
     },
 )

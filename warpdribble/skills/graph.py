@@ -2,44 +2,42 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from ..assets import path as asset
 from ..learning.graph import ControlGraph, cyclic_graph
 from ..learning.tasks.locomotion import locomotion_model
-from ..sims import Model
+from ..sims.errors import InputError
+from ..sims.model import Model
 from .skill import Skill
 from .staged import stage_skill
 
 
-def skill_fields(skill: Skill) -> dict:
+def skill_fields(skill: Skill) -> dict[str, Any]:
     """What a run keeps of a skill, by key; where its file lies is not part of it."""
     return {key: value for key, value in asdict(skill).items() if key != "source"}
 
 
-def skill_text(name: str | Path) -> str:
-    """The file of a skill, by name or path as `skills.skill` takes it."""
-    if Path(name).suffix.lower() == ".toml":
-        return Path(name).read_text(encoding="utf-8")
-    return asset(f"skills/{name}.toml").read_text(encoding="utf-8")
-
-
-def check_cyclic(skill: Skill) -> None:
-    """Raise ValueError for a skill that is done once."""
-    if not skill.cyclic:
-        raise ValueError(
-            f"the skill '{skill.name}' is not cyclic: locomotion is learned on cycles, "
-            "those that warpdribble skill list says are"
-        )
+def skill_text(skill: Skill) -> str:
+    """The file of a skill; what it would say, where it has none yet."""
+    if skill.is_clip:
+        known = {key: value for key, value in skill_fields(skill).items() if value not in ("", (), {}, False)}
+        return "".join(f"{key} = {json.dumps(value)}\n" for key, value in known.items())
+    source = Path(skill.source)
+    return (source if source.exists() else asset(str(source))).read_text(encoding="utf-8")
 
 
 def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGraph, tuple[str, ...]]:
     """The graph of a cyclic skill, and notes on it. data: folder of recordings, None for the usual one.
-    Raises ValueError."""
-    check_cyclic(skill)
+    Raises InputError."""
     player, model = Model.load("player"), locomotion_model()
     one = stage_skill(player, skill, data)
+    if one.cycle is None:
+        reason = f"the skill '{skill.name}' is not cyclic: locomotion is learned on cycles"
+        raise InputError(reason, hint="cyclic")
     joint_q = model.convert_q(player, one.cycle.reference.joint_q)
     cycle = replace(one.cycle, reference=replace(one.cycle.reference, joint_q=joint_q))
-    return cyclic_graph(model, cycle), one.notes
+    return cyclic_graph(model, cycle, model.roles.both("feet"), skill.name), one.notes

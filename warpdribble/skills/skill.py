@@ -13,17 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from ..assets import path as asset
+from ..sims.errors import InputError
 
 HANDS = ("left", "right")
 CONTACT_KEYS = (*HANDS, "checkpoints", "heights")
 
 
-class SkillError(ValueError):
+class SkillError(InputError):
     """A skill that cannot be used; the message is one line with the file, the key and the reason."""
 
-    def __init__(self, source: str | Path, key: str, reason: str) -> None:
-        super().__init__(f"{source}: {key}: {reason}" if key else f"{source}: {reason}")
-        self.source, self.key, self.reason = str(source), key, reason
+    def __init__(self, source: str | Path, key: str, reason: str, hint: str = "") -> None:
+        super().__init__(f"{key}: {reason}" if key else reason, source, hint)
+        self.source, self.key = str(source), key
 
 
 @dataclass(frozen=True)
@@ -47,13 +48,33 @@ class Skill:
     mapping: str = ""
     """Of the clip's joints: shipped name or file; empty for the shipped one that fits."""
     repairs: str = ""
-    """Of the clip, as `--repair` takes them."""
+    """Of the clip, joined by commas."""
+    units: str = ""
+    """Of the clip's lengths, and"""
+    up: str = ""
+    """which of its axes points up, and"""
+    asf: str = ""
+    """the skeleton of an .amc clip: as `clips.read_clip` takes them, or empty."""
     contact: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """"left" and "right" -> (from, to) [s] in which that hand has the ball; empty: inferred."""
     checkpoints: tuple[float, ...] = ()
     """[s], where the ball is highest; empty: inferred."""
     heights: tuple[float, ...] = ()
     """[m], the ball's at each checkpoint (h_ref of P1 Eq. 8); empty: from the hand."""
+
+    @property
+    def is_clip(self) -> bool:
+        """Whether it has no file: a part of a clip, on its way to become a skill."""
+        return bool(self.clip) and self.source == self.clip
+
+
+def clip_skill(clip: str | Path, frames: tuple[int, int] = (0, -1), **rest: Any) -> Skill:
+    """A part of a clip as a skill that has no file yet. rest: fields of `Skill`; None stands for empty."""
+    path = str(Path(clip).absolute())
+    rest = {key: "" if value is None else value for key, value in rest.items()}
+    first, last = frames
+    part = f"frames {first} to {'the last' if last < 0 else last}"
+    return Skill(Path(clip).stem, path, f"{Path(clip).name}, {part}", path, frames=frames, **rest)
 
 
 def skill_names() -> list[str]:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..clips.data import data_folder
-from ..clips.errors import ClipError
+from ..clips import ClipError, data_folder
 from ..sims.ball.ball import Ball, ball_path, find_checkpoints, flights_of, inferred_ball, recorded_ball
 from ..sims.ball.hands import find_hands
-from ..sims.model import gaps, pose
+from ..sims.model import Model
 from ..sims.reference.mirror import mirrored, mirrored_ball
 from ..sims.reference.reference import BLEND, Cycle, Reference, close_cycle
 from ..sims.retarget.mapping import MappingError, find_mapping, read_mapping
@@ -42,17 +41,18 @@ def find_clip(skill: Skill, data: str | Path | None = None) -> Path:
     for place in places:
         if place.exists():
             return place
-    raise SkillError(
-        skill.source, "clip", f"no file '{skill.clip}' in {folder}; `warpdribble fetch` gets the recordings"
-    )
+    raise SkillError(skill.source, "clip", f"no file '{skill.clip}' in {folder}", "fetch")
 
 
-def stage_skill(model, skill: Skill, data: str | Path | None = None) -> StagedSkill:
+def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> StagedSkill:
     """The skill on a model. Raises SkillError for a clip that is missing or cannot be used."""
+    if model.roles.ball is None:
+        skill = replace(skill, ball=False)
     if skill.authored:
         reference, ball, notes = _authored(model, skill)
     else:
         reference, ball, notes = _recorded(model, skill, data)
+    notes = [*notes, *_ball_notes(skill, ball)]
     if not skill.ball:
         ball = None
     elif skill.contact or skill.checkpoints:
@@ -66,15 +66,30 @@ def stage_skill(model, skill: Skill, data: str | Path | None = None) -> StagedSk
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
         reference = cycle.reference
-    if ball is not None and "ball" in model.joint_names and not skill.authored:
+        if cycle.gap:
+            notes.append(f"its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
+    if ball is not None and not skill.authored:
         joint_q = reference.joint_q.copy()
-        joint_q[:, model.q_slice("ball")][:, :3] = ball.path
+        joint_q[:, model.q_slice(model.roles.one("ball_joint"))][:, :3] = ball.path
         reference = replace(reference, joint_q=joint_q)
         cycle = replace(cycle, reference=reference) if cycle is not None else None
     return StagedSkill(skill, reference, cycle, ball, tuple(notes))
 
 
-def _authored(model, skill: Skill):
+def _ball_notes(skill: Skill, ball: Ball | None) -> list[str]:
+    """Where the ball comes from: what was guessed, or left out, is said."""
+    if not skill.ball:
+        return ["ball left out"] if ball is not None else []
+    if skill.contact or skill.checkpoints:
+        return ["ball as the skill says"]
+    if ball is None:
+        return ["no ball shows"]
+    if skill.authored:
+        return []
+    return ["ball recorded" if ball.recorded else "ball inferred from the hands' motion"]
+
+
+def _authored(model: Model, skill: Skill) -> tuple[Reference, Ball | None, list[str]]:
     from ..sims.authored.catalogue import AUTHORED, authored_clip
 
     if skill.authored not in AUTHORED:
@@ -84,39 +99,52 @@ def _authored(model, skill: Skill):
     return clip.reference, clip.ball, [f"authored clip {skill.authored}"]
 
 
-def _recorded(model, skill: Skill, data):
-    from ..clips.read import read_part
+def _recorded(
+    model: Model, skill: Skill, data: str | Path | None
+) -> tuple[Reference, Ball | None, list[str]]:
+    from ..clips import read_part
 
-    path = find_clip(skill, data)
+    path = Path(skill.clip) if skill.is_clip else find_clip(skill, data)
+
+    def fail(key: str, reason: str, error: ValueError) -> ValueError:
+        if skill.is_clip:
+            return error if isinstance(error, ClipError) else ClipError(path, reason)
+        return SkillError(skill.source, key, reason)
+
+    reading = {name: getattr(skill, name) or None for name in ("units", "up", "asf")}
     try:
-        motion, notes = read_part(path, skill.frames, skill.repairs)
+        motion, notes = read_part(path, skill.frames, skill.repairs, **reading)
     except ClipError as error:
-        key = "frames" if "is not a range" in error.reason else "clip"
-        raise SkillError(skill.source, key, f"{path.name}: {error.reason.replace('--frames ', '')}") from None
+        key = error.hint if error.hint == "frames" else "clip"
+        raise fail(key, f"{path.name}: {error.reason}", error) from None
     except ValueError as error:
-        raise SkillError(skill.source, "repairs", str(error)) from None
+        raise fail("repairs", str(error), error) from None
+    if motion.duration < 2 * model.timestep:
+        reason = f"its frames last only {motion.duration:.3f} s"
+        raise fail("frames", reason, ClipError(path, reason))
     try:
         mapping = read_mapping(skill.mapping) if skill.mapping else find_mapping(motion)
         result = retargeted(model, motion, mapping)
     except MappingError as error:
-        raise SkillError(skill.source, "mapping", str(error)) from None
-    ball = recorded_ball(model, result, motion)
-    if ball is None or not ball.touch.any():
-        ball = inferred_ball(model, result.reference)
+        raise fail("mapping", str(error), error) from None
+    ball = None
+    if model.roles.ball is not None:
+        ball = recorded_ball(model, result, motion)
+        if ball is None or not ball.touch.any():
+            ball = inferred_ball(model, result.reference)
     return result.reference, ball, notes
 
 
-def _closed(model, reference: Reference) -> Cycle:
+def _closed(model: Model, reference: Reference) -> Cycle:
     """The cycle, with feet that closing has bent into the ground lifted out of it."""
     cycle = close_cycle(model, reference)
     joint_q = cycle.reference.joint_q.copy()
-    for knee in (n for n in ("l_knee", "r_knee") if n in model.joint_names):
-        foot = pose.limb_bodies(model, knee)[2]
-        lift_out(model, joint_q, knee, None, gaps.descendants(model, foot))
+    for knee, foot in zip(model.roles.knees, model.roles.feet):
+        lift_out(model, joint_q, knee, None, model.descendants(model.body(foot)))
     return replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
 
 
-def _closed_ball(model, ball: Ball, cycle: Cycle) -> Ball:
+def _closed_ball(model: Model, ball: Ball, cycle: Cycle) -> Ball:
     """The ball of a closed cycle: with the closed hands where it was inferred, bent to where it begins where
     it was recorded."""
     reference = cycle.reference
@@ -133,7 +161,7 @@ def _closed_ball(model, ball: Ball, cycle: Cycle) -> Ball:
     return replace(ball, path=path)
 
 
-def _as_written(model, skill: Skill, reference: Reference, ball: Ball | None) -> Ball:
+def _as_written(model: Model, skill: Skill, reference: Reference, ball: Ball | None) -> Ball:
     """The ball with the contacts, checkpoints and heights that the file gives."""
     times = reference.timestep * np.arange(reference.frame_count)
     touch = np.zeros((len(times), 2), bool)
@@ -150,9 +178,11 @@ def _as_written(model, skill: Skill, reference: Reference, ball: Ball | None) ->
         reason = f"{late[0]} s is beyond the clip, which lasts {reference.duration:.3f} s"
         raise SkillError(skill.source, "contact.checkpoints", reason)
     hands = find_hands(model, reference)
-    recorded = ball is not None and ball.recorded
-    flights = ball.flights if recorded else flights_of(touch)
-    path = ball.path if recorded else ball_path(hands, touch, flights)
+    if ball is not None and ball.recorded:
+        recorded, flights, path = True, ball.flights, ball.path
+    else:
+        recorded, flights = False, flights_of(touch)
+        path = ball_path(hands, touch, flights)
     if skill.checkpoints:
         rows = tuple(min(round(t / reference.timestep), len(times) - 1) for t in skill.checkpoints)
     else:

@@ -1,0 +1,26 @@
+"""What the command line says for the hints that errors carry."""
+
+from __future__ import annotations
+
+from ..sims.errors import InputError
+
+HINTS = {
+    "out": "give another --out",
+    "frames": "give other --frames",
+    "fetch": "warpdribble fetch gets the recordings",
+    "learn": "warpdribble learn SKILL --out RUN learns one",
+    "run": "give a folder that warpdribble learn wrote",
+    "cyclic": "take one of those that warpdribble skill list says are",
+    "root": "try --root tracked, or another clip",
+    "mirror": "give another --mirror",
+    "mapping": "give another --mapping",
+    "seed": "try another --seed",
+}
+"""Hint -> what it means here, for `sims.errors.InputError`."""
+
+
+def one_line(error: Exception) -> str:
+    """An error's message, in the words of the command line."""
+    said = " ".join(str(error).split())
+    hint = HINTS.get(error.hint) if isinstance(error, InputError) else None
+    return f"{said}; {hint}" if hint else said
