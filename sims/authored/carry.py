@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..ball.hands import ball_radius
 from ..reference.reference import Reference
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import place_palm
@@ -59,6 +58,6 @@ def carry(model, style: Carry = Carry()) -> tuple[Reference, np.ndarray, np.ndar
     for name, sign in (("r", 1.0), ("l", -1.0)):
         normal = sign * left - 0.18 * ahead + [0.0, 0.0, 0.15]
         pointing = ahead - [0.0, 0.0, 0.35]
-        place_palm(model, joint_q, name, ball, normal, pointing, [0.25, -0.75, 0.6], ball_radius(model))
+        place_palm(model, joint_q, name, ball, normal, pointing, [0.25, -0.75, 0.6], model.ball_radius)
     joint_q[-1] = joint_q[0]
     return Reference(joint_q, model.timestep), ball, np.ones((steps + 1, 2), bool)

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from ..model import pose
-from ..reference.reference import Reference, resample_q, root_joint
+from ..reference.reference import Reference, resample_q
 
 GRAVITY = 9.81
 HAND_YAW = np.radians(18.0)
@@ -183,7 +183,7 @@ def fingers(model, curl: float, sides: str = "r") -> np.ndarray:
 
 
 def trunk(model, joint_q, style: Dribble, phase) -> None:
-    root = model.q_slice(root_joint(model))
+    root = model.q_slice(model.root)
     joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
     joint_q[:, root.start + 1] = -0.01
     joint_q[:, root.start + 2] = style.pelvis_height + style.give * np.cos(phase)
@@ -199,7 +199,7 @@ def trunk(model, joint_q, style: Dribble, phase) -> None:
 
 
 def legs(model, joint_q, style: Dribble) -> None:
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    zero = model.zero_pose[:, :3]
     for side, (forward, left, out) in zip("lr", style.feet):
         ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])
         foot = Rotation.from_euler("z", out, degrees=True)
@@ -210,7 +210,7 @@ def legs(model, joint_q, style: Dribble) -> None:
 def _left_arm(model, joint_q, phase) -> None:
     """Hangs beside the body, half bent in front, swinging a little against the push."""
     upper, lower, _ = pose.limb_bodies(model, "l_elbow")
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    zero = model.zero_pose[:, :3]
     swing = np.radians(3.0) * np.sin(phase)
     down = np.column_stack([np.sin(0.12 + swing), np.full_like(phase, 0.24), -np.cos(0.12 + swing)])
     inward = np.tile([0.35, -1.0, 0.0], (len(phase), 1))

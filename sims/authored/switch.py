@@ -12,7 +12,6 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
-from ..ball.hands import ball_radius
 from ..reference.mirror import mirrored
 from ..reference.reference import Reference
 from .dribble import Dribble, fingers, legs, stroke, trunk
@@ -48,7 +47,7 @@ def switch(model, style: Switch = Switch()) -> tuple[Reference, np.ndarray, np.n
     half = round(style.stance.period / model.timestep)
     stance = replace(style.stance, period=half * model.timestep)
     times = np.arange(2 * half + 1) * model.timestep
-    period, radius = stance.period, ball_radius(model)
+    period, radius = stance.period, model.ball_radius
     flight, height, palm = stroke(stance, radius)
     ball = np.empty((len(times), 3))
     ball[:, 0] = style.ahead

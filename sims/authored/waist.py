@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ..ball.hands import ball_radius
 from ..reference.reference import Reference
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import MIRROR, place_palm
@@ -60,7 +59,7 @@ def waist(model, style: Waist = Waist()) -> tuple[Reference, np.ndarray, np.ndar
     begins with the ball in front; it goes to the left first."""
     steps = round(style.period / model.timestep)
     times = np.arange(steps + 1) * model.timestep
-    period, radius = steps * model.timestep, ball_radius(model)
+    period, radius = steps * model.timestep, model.ball_radius
     angle = 2.0 * np.pi * times / period
     joint_q = np.tile(fingers(model, 0.7, "lr"), (steps + 1, 1))
     trunk(model, joint_q, style.stance, 2.0 * angle)

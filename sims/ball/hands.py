@@ -37,7 +37,7 @@ class Hands:
 def find_hands(model, reference) -> Hands:
     """The hands of a model in a reference; its palms are the sites `l_palm` and `r_palm`."""
     body_q = pose.forward(model, reference.joint_q)
-    radius = ball_radius(model)
+    radius = model.ball_radius
     centres, normals, shoulders = [], [], []
     for side in SIDES:
         body, place, turn = model.sites[f"{side}_palm"]
@@ -50,9 +50,3 @@ def find_hands(model, reference) -> Hands:
     velocity = np.gradient(smooth, reference.timestep, axis=0) if len(smooth) > 1 else 0.0 * smooth
     shoulder, normal = np.stack(shoulders, axis=1), np.stack(normals, axis=1)
     return Hands(centre, velocity, normal, shoulder, radius, reference.timestep)
-
-
-def ball_radius(model) -> float:
-    """[m] of the model's body `ball`."""
-    ball = model.body("ball")
-    return float(next(s.size[0] for s in model.shapes if s.body == ball))

@@ -43,12 +43,8 @@ def gap_to_bodies(model, body_q: np.ndarray, bodies, points: np.ndarray) -> np.n
 
 
 def descendants(model, body: int) -> list[int]:
-    """A body and all bodies that hang from it."""
-    found = [body]
-    for child, parent in enumerate(model.body_parent):
-        if parent in found:
-            found.append(child)
-    return found
+    """`Model.descendants`, for callers that still come here."""
+    return model.descendants(body)
 
 
 def _place(shape, body_q: np.ndarray) -> tuple[np.ndarray, Rotation]:

@@ -14,8 +14,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-FREE, BALL, HINGE = 0, 1, 2
-KINDS = {0: "plane", 2: "sphere", 3: "capsule", 6: "box"}
+from .joints import BALL, FREE, HINGE
+
+JOINTS = {0: FREE, 1: BALL, 3: HINGE}
+"""MuJoCo's joint types, but for the slide, which is not simulated."""
+GEOMS = {0: "plane", 2: "sphere", 3: "capsule", 6: "box"}
+"""MuJoCo's geom types that are simulated."""
 ANYWHERE = 1.0e9
 """Effort limit [N m] of a joint that has none."""
 
@@ -125,11 +129,8 @@ def compile_mjcf(
 
 
 def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
-    sizes = {0: 7, 1: 4, 2: 1, 3: 1}
-    return {
-        m.joint(j).name or f"joint{j}": qpos[m.jnt_qposadr[j] :][: sizes[int(m.jnt_type[j])]].copy()
-        for j in range(m.njnt)
-    }
+    parts = np.split(qpos, m.jnt_qposadr[1:])
+    return {m.joint(j).name or f"joint{j}": part.copy() for j, part in zip(range(m.njnt), parts)}
 
 
 def _leave_out(spec, name: str, path) -> None:
@@ -181,7 +182,7 @@ def check_supported(m, path: str | Path) -> None:
     for g in range(m.ngeom):
         collides = m.geom_contype[g] or m.geom_conaffinity[g]
         kind = int(m.geom_type[g])
-        if kind not in KINDS and collides:
+        if kind not in GEOMS and collides:
             refuse(
                 f"{_geom_type(kind)} geom '{m.geom(g).name or g}' that collides",
                 "use capsules, boxes, spheres and planes, or set contype and conaffinity to 0",
@@ -234,7 +235,7 @@ def read_shapes(m) -> list[Shape]:
     """The geoms that collide, and those that only show, of a supported kind."""
     shapes = []
     for g in range(m.ngeom):
-        kind = KINDS.get(int(m.geom_type[g]))
+        kind = GEOMS.get(int(m.geom_type[g]))
         if kind is None:
             continue
         user = m.geom_user[g] if m.nuser_geom >= 3 else (0.0, 0.2, 1.0e-5)
@@ -274,7 +275,7 @@ def read_links(m) -> tuple[Tables, dict[str, np.ndarray]]:
         turn = (frame * Rotation.from_quat(xyzw(m.body_quat[b]))).as_quat()
         first = int(m.body_jntadr[b])
         for j in range(first, first + int(m.body_jntnum[b])):
-            joint = {0: FREE, 1: BALL, 3: HINGE}[int(m.jnt_type[j])]
+            joint = JOINTS[int(m.jnt_type[j])]
             anchor = np.zeros(3) if joint == FREE else m.jnt_pos[j]
             low, high = m.jnt_range[j]
             q = int(m.jnt_qposadr[j])

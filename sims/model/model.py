@@ -8,25 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from .mjcf import (
-    BALL,
-    FREE,
-    ModelError,
-    Shape,
-    check_supported,
-    compile_mjcf,
-    read_drives,
-    read_inertia,
-    read_links,
-    read_shapes,
-    xyzw,
-)
+from .joints import DOF_SIZE, KINDS, Q_SIZE, Coordinates, Joint, Kind, coordinates
+from .mjcf import ModelError, Shape
+from .pose import forward
 from .roles import Roles, find_roles
-from .slots import build_slots
-
-JOINT_TYPES = ("free", "ball", "hinge")
-JOINT_Q = (7, 4, 1)
-JOINT_DOF = (6, 3, 1)
 
 
 @dataclass
@@ -89,6 +74,8 @@ class Model:
         Raises ModelError (a ValueError) when the file is missing, broken or holds something that is
         not simulated.
         """
+        from .load import load_mjcf
+
         if str(name) == "player":
             from ...assets import path as asset
 
@@ -118,13 +105,18 @@ class Model:
         """Index of a joint. Raises KeyError with the names there are."""
         return _index(self.joint_names, name, "joint")
 
-    def joint_type(self, name: str) -> str:
+    def joint_type(self, name: str) -> Kind:
         """ "free", "ball" or "hinge"."""
-        return JOINT_TYPES[self.tables["link_joint"][self.joint_link[self.joint(name)]]]
+        return self.joints[self.joint(name)].kind
 
     def joint_axis(self, name: str) -> np.ndarray:
         """(3,) unit axis of a hinge in its body's frame."""
-        return self.tables["link_axis"][self.joint_link[self.joint(name)]].copy()
+        return self.joints[self.joint(name)].axis.copy()
+
+    @property
+    def root(self) -> str:
+        """The free joint of the first tree. Raises ModelError where there is none."""
+        return self.roles.one("root")
 
     def joint_body(self, name: str) -> int:
         """Index of the body that a joint moves against its parent."""
@@ -140,15 +132,11 @@ class Model:
 
     def q_slice(self, name: str) -> slice:
         """Where a joint's coordinates are in joint_q."""
-        link = self.joint_link[self.joint(name)]
-        start = int(self.tables["link_q"][link])
-        return slice(start, start + JOINT_Q[self.tables["link_joint"][link]])
+        return self.joints[self.joint(name)].q
 
     def dof_slice(self, name: str) -> slice:
         """Where a joint's velocities are in joint_qd."""
-        link = self.joint_link[self.joint(name)]
-        start = int(self.tables["link_dof"][link])
-        return slice(start, start + JOINT_DOF[self.tables["link_joint"][link]])
+        return self.joints[self.joint(name)].dof
 
     def listed(self, text: str) -> list[str]:
         """Names of bodies that the file lists under <custom><text name=...>, in its order; empty where it
@@ -168,14 +156,112 @@ class Model:
         """Which bodies and joints play which part: root, hands, feet, ball ..."""
         return find_roles(self)
 
+    # -------------------------------------------------------------------------------------- tree
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints, in the order of `joint_names`."""
+        return tuple(self._joint(i) for i in range(len(self.joint_names)))
+
+    def _joint(self, i: int) -> Joint:
+        t, link = self.tables, int(self.joint_link[i])
+        kind, q, dof = (int(t[name][link]) for name in ("link_joint", "link_q", "link_dof"))
+        limits = (float(t["link_lower"][link]), float(t["link_upper"][link]))
+        return Joint(
+            name=self.joint_names[i],
+            kind=KINDS[kind],
+            link=link,
+            parent=int(t["link_parent"][link]),
+            body=int(self.joint_child[i]),
+            q=slice(q, q + Q_SIZE[kind]),
+            dof=slice(dof, dof + DOF_SIZE[kind]),
+            offset=t["link_offset"][link],
+            turn=t["link_turn"][link],
+            axis=t["link_axis"][link],
+            zero=float(t["link_zero"][link]),
+            limits=limits if t["link_limited"][link] else None,
+            kp=float(t["dof_kp"][dof]),
+            kd=float(t["dof_kd"][dof]),
+            effort=float(t["link_effort"][link]),
+            driven=bool(t["link_driven"][link]),
+            armature=float(t["dof_armature"][dof]),
+            com=t["link_com"][link],
+        )
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """Which coordinates add and which turn."""
+        return coordinates(self.joints)
+
     def quaternions(self) -> list[int]:
         """Where quaternions start in joint_q."""
-        t = self.tables
-        return [
-            int(q) + (3 if joint == FREE else 0)
-            for q, joint in zip(t["link_q"][1:], t["link_joint"][1:], strict=True)
-            if joint in (FREE, BALL)
-        ]
+        return self.coordinates.turn_q[:, 0].tolist()
+
+    @property
+    def body_link(self) -> np.ndarray:
+        """(nbody,) the link that each body is part of; 0 where it is welded to the world."""
+        return self.tables["body_link"]
+
+    @property
+    def body_offset(self) -> np.ndarray:
+        """(nbody, 3) [m] of each body's origin in its link."""
+        return self.tables["body_offset"]
+
+    @property
+    def body_turn(self) -> np.ndarray:
+        """(nbody, 4) xyzw of each body's frame in its link."""
+        return self.tables["body_turn"]
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """(3,) [m/s^2]"""
+        return self.tables["gravity"]
+
+    def children(self, body: int) -> list[int]:
+        """The bodies that hang from a body; from the world for -1."""
+        return np.flatnonzero(self.body_parent == body).tolist()
+
+    def descendants(self, body: int) -> list[int]:
+        """A body and all bodies that hang from it, directly or not."""
+        found = [body]
+        for child, parent in enumerate(self.body_parent):
+            if parent in found:
+                found.append(child)
+        return found
+
+    def first_shape(self, body: int) -> Shape:
+        """The shape of a body that the file names first. Raises ValueError when it has none."""
+        for shape in self.shapes:
+            if shape.body == body:
+                return shape
+        raise ValueError(f"body '{self.body_names[body]}' of the model has no shape")
+
+    @property
+    def ball_radius(self) -> float:
+        """[m] of the ball. Raises ModelError for a model without one."""
+        return float(self.first_shape(self.body(self.roles.one("ball"))).size[0])
+
+    @cached_property
+    def zero_q(self) -> np.ndarray:
+        """(nq,) coordinates of the zero pose: free joints where the file puts them, every angle zero. Not to
+        be written to."""
+        joint_q = np.zeros(self.nq)
+        joint_q[self.coordinates.turn_q[:, 3]] = 1.0
+        for joint in self.joints:
+            if joint.kind == "free":
+                joint_q[joint.q] = [*joint.offset, *joint.turn]
+            elif joint.kind == "hinge":
+                joint_q[joint.q] = joint.zero
+        joint_q.flags.writeable = False
+        return joint_q
+
+    @cached_property
+    def zero_pose(self) -> np.ndarray:
+        """(nbody, 7) [m, -] body frames in the zero pose, position and quaternion xyzw. Not to be written
+        to."""
+        body_q = forward(self, self.zero_q)[0]
+        body_q.flags.writeable = False
+        return body_q
 
 
 def _index(names: list[str], name: str, what: str) -> int:
@@ -184,125 +270,3 @@ def _index(names: list[str], name: str, what: str) -> int:
     except ValueError:
         known = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
         raise KeyError(f"no {what} named {name!r}; there are: {known}") from None
-
-
-def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without: tuple[str, ...]) -> Model:
-    m, keys, gone = compile_mjcf(path, rigid, pose, without)
-    check_supported(m, path)
-    t, bodies = read_links(m)
-    inertia = read_inertia(m, **bodies, link_count=len(t.link_parent))
-    kp, kd, notes = read_drives(m, t, path)
-    shapes = read_shapes(m)
-    geoms = [g for g in range(m.ngeom) if int(m.geom_type[g]) in (0, 2, 3, 6)]
-    links = {
-        "com": inertia["link_com"],
-        "count": np.bincount(bodies["body_link"][1:], minlength=len(t.link_parent)),
-    }
-    slots = build_slots(m, geoms, shapes, t, bodies, links)
-    pairs = slots.pop("pairs")
-    stiffness = np.zeros(m.nv)
-    for j in range(m.njnt):
-        dofs = slice(m.jnt_dofadr[j], m.jnt_dofadr[j] + JOINT_DOF[(0, 1, 0, 2)[m.jnt_type[j]]])
-        stiffness[dofs] = m.jnt_stiffness[j]
-    tables = {key: np.array(value) for key, value in vars(t).items()} | inertia | slots
-    tables |= {
-        "body_link": bodies["body_link"][1:],
-        "body_offset": bodies["body_offset"][1:],
-        "body_turn": bodies["body_turn"][1:],
-        "dof_kp": kp,
-        "dof_kd": kd,
-        "dof_armature": m.dof_armature.copy(),
-        "dof_damping": m.dof_damping.copy(),
-        "dof_stiffness": stiffness,
-        "pair_erp": np.array([p["erp"] for p in pairs]),
-        "pair_cfm": np.array([p["cfm"] for p in pairs]),
-    }
-    model = Model(
-        name=name,
-        path=path,
-        timestep=float(m.opt.timestep),
-        nq=m.nq,
-        nv=m.nv,
-        body_names=[m.body(b).name or f"body{b}" for b in range(1, m.nbody)],
-        body_parent=m.body_parentid[1:] - 1,
-        body_mass=m.body_mass[1:].copy(),
-        body_com=m.body_ipos[1:].copy(),
-        body_inertia=_inertia_matrices(m),
-        joint_names=[m.joint(j).name or f"joint{j}" for j in range(m.njnt)],
-        joint_link=np.arange(1, m.njnt + 1),
-        joint_child=m.jnt_bodyid - 1,
-        shapes=shapes,
-        sites={
-            m.site(s).name: (
-                int(m.site_bodyid[s]) - 1,
-                m.site_pos[s].copy(),
-                xyzw(m.site_quat[s]),
-            )
-            for s in range(m.nsite)
-        },
-        keyframes={},
-        texts={
-            _string(m.names, m.name_textadr[k]): " ".join(
-                word for word in _string(m.text_data, m.text_adr[k]).split() if word not in gone
-            )
-            for k in range(m.ntext)
-        },
-        start_q=np.zeros(m.nq),
-        tables=tables,
-        pairs=pairs,
-        notes=notes,
-    )
-    model.keyframes = {
-        key: _order(model, np.concatenate(list(joints.values()))) for key, joints in keys.items()
-    }
-    model.start_q = model.keyframes.get("start", _order(model, m.qpos0)).copy()
-    tables["q_spring"] = _order(model, m.qpos_spring)
-    tables["gravity"] = m.opt.gravity.copy()
-    tables["body_com"] = bodies["body_offset"][1:] + _rotate(bodies["body_turn"][1:], m.body_ipos[1:])
-    tables["slot_flag"] = _flags(model)
-    return model
-
-
-def _string(data: bytes, start: int) -> str:
-    """The zero-terminated string at `start` of one of MuJoCo's buffers."""
-    data = bytes(data)
-    return data[start : data.index(b"\0", start)].decode()
-
-
-def _order(model: Model, qpos: np.ndarray) -> np.ndarray:
-    """MuJoCo's qpos with quaternions turned to xyzw."""
-    q = np.array(qpos, float)
-    for k in model.quaternions():
-        q[k : k + 4] = xyzw(q[k : k + 4])
-    return q
-
-
-def _rotate(quat: np.ndarray, v: np.ndarray) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_quat(quat).apply(v)
-
-
-def _inertia_matrices(m) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    R = Rotation.from_quat(xyzw(m.body_iquat[1:])).as_matrix()
-    return np.einsum("bij,bj,bkj->bik", R, m.body_inertia[1:], R)
-
-
-def _flags(model: Model) -> np.ndarray:
-    """What a touch in each slot means: 1, a fall (part of the player other than its feet on the ground);
-    2, a bad contact (the ball on the player's body other than the hands)."""
-    feet, hands, ball = (model.named_bodies(k) for k in ("feet", "hands", "ball"))
-    flags = []
-    for a, b in zip(model.tables.get("slot_a", []), model.tables.get("slot_b", []), strict=True):
-        touching = {model.shapes[a].body, model.shapes[b].body}
-        moving = touching - {-1}
-        if len(moving) == 1:
-            flags.append(int(bool(feet) and not moving & (feet | ball)))
-        else:
-            flags.append(2 if touching & ball and not touching & hands else 0)
-    return np.array(flags, int)
-
-
-__all__ = ["Model", "ModelError"]

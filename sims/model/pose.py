@@ -3,71 +3,59 @@ needs, off the simulator."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ..planar import wrapped
-from .model import JOINT_TYPES
+
+if TYPE_CHECKING:
+    from .model import Model
 
 
-def forward(model, joint_q: np.ndarray) -> np.ndarray:
-    """Body frames (frames, nbody, 7) [m, -], position and quaternion xyzw, for joint_q (frames,
-    nq)."""
+def forward(model: Model, joint_q: ArrayLike, bodies: Iterable[int] | None = None) -> np.ndarray:
+    """Body frames (frames, nbody, 7) [m, -], position and quaternion xyzw, for joint_q (frames, nq).
+
+    bodies: whose frames are wanted, all by default; the others are NaN. -1, the world, may be among them.
+    """
     joint_q = np.atleast_2d(np.asarray(joint_q, dtype=float))
-    t, frames = model.tables, len(joint_q)
-    places, turns = [np.zeros((frames, 3))], [Rotation.identity(frames)]
-    for link in range(1, len(t["link_parent"])):
-        parent = t["link_parent"][link]
-        turn = turns[parent] * Rotation.from_quat(t["link_turn"][link])
-        place = places[parent] + turns[parent].apply(t["link_offset"][link])
-        q = joint_q[:, t["link_q"][link] :]
-        kind = JOINT_TYPES[t["link_joint"][link]]
-        if kind == "free":
-            place, turn = q[:, :3].copy(), Rotation.from_quat(q[:, 3:7])
-        elif kind == "ball":
-            turn = turn * Rotation.from_quat(q[:, :4])
+    frames, links = len(joint_q), model.body_link
+    wanted = range(model.nbody) if bodies is None else [body for body in bodies if body >= 0]
+    needed = {0}
+    for body in wanted:
+        link = int(links[body])
+        while link not in needed:
+            needed.add(link)
+            link = model.joints[link - 1].parent
+    places, turns = {0: np.zeros((frames, 3))}, {0: Rotation.identity(frames)}
+    for joint in model.joints:
+        if joint.link not in needed:
+            continue
+        q, above = joint_q[:, joint.q], turns[joint.parent]
+        place = places[joint.parent] + above.apply(joint.offset)
+        turn = above * Rotation.from_quat(joint.turn)
+        if joint.kind == "free":
+            place, turn = q[:, :3].copy(), Rotation.from_quat(q[:, 3:])
+        elif joint.kind == "ball":
+            turn = turn * Rotation.from_quat(q)
         else:
-            angle = q[:, :1] - t["link_zero"][link]
-            turn = turn * Rotation.from_rotvec(angle * t["link_axis"][link])
-        places.append(place)
-        turns.append(turn)
-    body_q = np.empty((frames, model.nbody, 7))
-    for body, link in enumerate(t["body_link"]):
-        body_q[:, body, :3] = places[link] + turns[link].apply(t["body_offset"][body])
-        turn = turns[link] * Rotation.from_quat(t["body_turn"][body])
-        body_q[:, body, 3:] = turn.as_quat()
+            turn = turn * Rotation.from_rotvec((q - joint.zero) * joint.axis)
+        places[joint.link], turns[joint.link] = place, turn
+    body_q = np.full((frames, model.nbody, 7), np.nan)
+    for body in wanted:
+        place, turn = places[int(links[body])], turns[int(links[body])]
+        body_q[:, body, :3] = place + turn.apply(model.body_offset[body])
+        body_q[:, body, 3:] = (turn * Rotation.from_quat(model.body_turn[body])).as_quat()
     return body_q
 
 
-def joint_body(model, joint: str) -> int:
-    """The body that a joint moves against its parent."""
-    return int(np.flatnonzero(model.tables["body_link"] == model.joint_link[model.joint(joint)])[0])
-
-
-def body_joint(model, body: int) -> str:
-    """The one joint that moves a body against its parent. Raises ValueError when there are none
-    or several."""
-    names = [n for n in model.joint_names if joint_body(model, n) == body]
-    if len(names) != 1:
-        raise ValueError(f"body '{model.body_names[body]}' has {len(names)} joints, not one")
-    return names[0]
-
-
-def zero_q(model) -> np.ndarray:
-    """Joint coordinates (nq,) of the zero pose: free joints where the file puts them, every
-    angle zero."""
-    joint_q, t = np.zeros(model.nq), model.tables
-    for name in model.joint_names:
-        place, link = model.q_slice(name), model.joint_link[model.joint(name)]
-        if model.joint_type(name) == "ball":
-            joint_q[place.stop - 1] = 1.0
-        elif model.joint_type(name) == "free":
-            joint_q[place] = [*t["link_offset"][link], *t["link_turn"][link]]
-        else:
-            joint_q[place] = t["link_zero"][link]
-    return joint_q
+def joint_body(model: Model, joint: str) -> int:
+    """`Model.joint_body`, for callers that still come here."""
+    return model.joint_body(joint)
 
 
 def twist(turn: Rotation, axis: np.ndarray) -> np.ndarray:
@@ -85,13 +73,14 @@ def frame_of(direction: np.ndarray, toward: np.ndarray) -> Rotation:
     return Rotation.from_matrix(np.stack([first, second, np.cross(first, second)], axis=-1))
 
 
-def limb_bodies(model, hinge: str) -> tuple[int, int, int]:
-    """The bodies before the hinge, behind it, and at the far end of the limb that it bends."""
-    lower = joint_body(model, hinge)
-    end = next((b for b, parent in enumerate(model.body_parent) if parent == lower), None)
-    if end is None or model.body_parent[lower] < 0:
+def limb_bodies(model: Model, hinge: str) -> tuple[int, int, int]:
+    """The bodies before the hinge, behind it, and at the far end of the limb that it bends. Raises ValueError
+    for a hinge that bends no limb."""
+    lower = model.joint_body(hinge)
+    ends, upper = model.children(lower), int(model.body_parent[lower])
+    if not ends or upper < 0:
         raise ValueError(f"the hinge '{hinge}' does not join two segments of a limb")
-    return int(model.body_parent[lower]), lower, end
+    return upper, lower, ends[0]
 
 
 @dataclass(frozen=True)
@@ -137,21 +126,24 @@ class Limb:
         return frame_of(reach, hinge) * own.inv(), angle
 
 
-def place_limb(model, joint_q, hinge: str, end, end_turn: Rotation, axis) -> None:
+def place_limb(
+    model: Model, joint_q: np.ndarray, hinge: str, end: ArrayLike, end_turn: Rotation, axis: ArrayLike
+) -> None:
     """Solve a limb of joint_q (frames, nq) in place.
 
     The body at the limb's far end gets its origin to `end` (3,) or (frames, 3) [m] and the world
     rotation `end_turn`; the hinge's axis points toward `axis` (3,) or (frames, 3) in the world.
     """
     upper, lower, last = limb_bodies(model, hinge)
-    zero = forward(model, zero_q(model))[0, :, :3]
+    above = int(model.body_parent[upper])
+    zero = model.zero_pose[:, :3]
     limb = Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
-    now = forward(model, joint_q)
+    now = forward(model, joint_q, (upper, above))
     frames = len(joint_q)
     end, axis = (np.array(np.broadcast_to(v, (frames, 3))) for v in (end, axis))
     turn, angle = limb.solve(now[:, upper, :3], end, axis)
-    parent = Rotation.from_quat(now[:, model.body_parent[upper], 3:])
-    joint_q[:, model.q_slice(body_joint(model, upper))] = (parent.inv() * turn).as_quat()
+    parent = Rotation.from_quat(now[:, above, 3:]) if above >= 0 else Rotation.identity()
+    joint_q[:, model.q_slice(model.body_joint(upper))] = (parent.inv() * turn).as_quat()
     joint_q[:, model.q_slice(hinge)] = angle[:, None]
     beyond = turn * Rotation.from_rotvec(angle[:, None] * model.joint_axis(hinge))
-    joint_q[:, model.q_slice(body_joint(model, last))] = (beyond.inv() * end_turn).as_quat()
+    joint_q[:, model.q_slice(model.body_joint(last))] = (beyond.inv() * end_turn).as_quat()

@@ -12,7 +12,8 @@ import warnings
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .mjcf import FREE, Shape
+from .joints import DOF_SIZE, FREE
+from .mjcf import Shape
 
 POINT_PLANE, SPHERE_CAPSULE, SPHERE_BOX, CAPSULE_CAPSULE = range(4)
 
@@ -41,8 +42,7 @@ class Chains:
 
     def dofs(self, i: int) -> list[int]:
         """Dofs of a link's joint, last first, the order in which a force meets them."""
-        count = {0: 6, 1: 3, 2: 1}[self.joint[i]]
-        return list(range(self.dof[i] + count - 1, self.dof[i] - 1, -1))
+        return list(range(self.dof[i] + DOF_SIZE[self.joint[i]] - 1, self.dof[i] - 1, -1))
 
     def response(self, a: int, b: int) -> list[int]:
         """Dofs that answer to a contact of links a and b: b's side, a's side, then both's."""

@@ -14,9 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from ..model import gaps, pose
 from ..signals import low_pass
-from .reference import Reference, integrate, root_joint
+from .reference import Reference, integrate
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
 SMOOTH = 8.0
 """[Hz] Motion above this gives no torque: it is noise, or too short to matter."""
 STANDING = 0.04
@@ -33,19 +32,19 @@ def leading_targets(model, reference: Reference, feet=(), root_lead: float = 0.0
     feet: bodies that may stand on the ground; without them only the damping is paid. root_lead [s]:
     damping over stiffness of a virtual drive of the root.
     """
-    kp, kd = (np.array(model.tables[name], dtype=float) for name in ("dof_kp", "dof_kd"))
+    kp, kd = np.zeros(model.nv), np.zeros(model.nv)
+    for joint in model.joints:
+        kp[joint.dof], kd[joint.dof] = joint.kp, joint.kd
     lead = np.divide(kd, kp, out=np.zeros_like(kd), where=kp > 0.0)
-    lead[model.dof_slice(root_joint(model))] = root_lead
+    lead[model.dof_slice(model.root)] = root_lead
     ahead = lead * reference.velocity(model)
     if feet:
         torque = holding_torques(model, reference, feet)
         ahead += np.divide(torque, kp, out=np.zeros_like(torque), where=kp > 0.0)
-    for name in model.joint_names:
-        if model.joint_type(name) != "free":
-            dofs = model.dof_slice(name)
-            effort = model.tables["link_effort"][model.joint_link[model.joint(name)]]
-            asked = np.linalg.norm(kp[dofs] * ahead[:, dofs], axis=1, keepdims=True)
-            ahead[:, dofs] *= np.minimum(1.0, SHARE * effort / np.maximum(asked, 1e-9))
+    for joint in model.joints:
+        if joint.kind != "free":
+            asked = np.linalg.norm(joint.kp * ahead[:, joint.dof], axis=1, keepdims=True)
+            ahead[:, joint.dof] *= np.minimum(1.0, SHARE * joint.effort / np.maximum(asked, 1e-9))
     return integrate(model, reference.joint_q, ahead)
 
 
@@ -53,29 +52,26 @@ def holding_torques(model, reference: Reference, feet) -> np.ndarray:
     """Joint torques (frames, nv) [N m] under which the reference carries itself; zero at free
     joints."""
     body_q = pose.forward(model, reference.joint_q)
-    root = pose.joint_body(model, root_joint(model))
-    own = gaps.descendants(model, root)
+    root = model.joint_body(model.root)
+    own = model.descendants(root)
     turns = [Rotation.from_quat(body_q[:, b, 3:]) for b in range(model.nbody)]
     com = np.stack([body_q[:, b, :3] + turns[b].apply(model.body_com[b]) for b in own], axis=1)
-    push = model.body_mass[own, None] * (_acceleration(com, reference.timestep) - GRAVITY)
+    push = model.body_mass[own, None] * (_acceleration(com, reference.timestep) - model.gravity)
     ground = _ground_forces(model, body_q, com, push, [model.body(f) for f in feet])
 
     torque = np.zeros((reference.frame_count, model.nv))
-    for name in model.joint_names:
-        body = pose.joint_body(model, name)
-        if model.joint_type(name) == "free" or body not in own:
+    for joint in model.joints:
+        if joint.kind == "free" or joint.body not in own:
             continue
-        beyond = gaps.descendants(model, body)
-        at = body_q[:, body, :3]
+        beyond = model.descendants(joint.body)
+        at = body_q[:, joint.body, :3]
         part = [own.index(b) for b in beyond]
         needed = np.cross(com[:, part] - at[:, None], push[:, part]).sum(axis=1)
         for foot, (place, force) in ground.items():
             if foot in beyond:
                 needed -= np.cross(place - at, force)
-        local = turns[body].inv().apply(needed)
-        if model.joint_type(name) == "hinge":
-            local = local @ model.joint_axis(name)[:, None]
-        torque[:, model.dof_slice(name)] = local
+        local = turns[joint.body].inv().apply(needed)
+        torque[:, joint.dof] = local @ joint.axis[:, None] if joint.kind == "hinge" else local
     return torque
 
 
@@ -99,10 +95,10 @@ def _ground_forces(model, body_q, com, push, feet):
     point = np.concatenate([-moment[:, 1:2] / up, moment[:, :1] / up, 0.0 * up], axis=1)
     middles, down = [], []
     for foot in feet:
-        shape = next(s for s in model.shapes if s.body == foot)
-        middle = body_q[:, foot, :3] + Rotation.from_quat(body_q[:, foot, 3:]).apply(shape.pos)
+        turn = Rotation.from_quat(body_q[:, foot, 3:])
+        middle = body_q[:, foot, :3] + turn.apply(model.first_shape(foot).pos)
         middles.append(middle * [1.0, 1.0, 0.0])
-        low = gaps.lowest_point(model, body_q, gaps.descendants(model, foot))
+        low = gaps.lowest_point(model, body_q, model.descendants(foot))
         down.append(np.clip(1.5 - low / STANDING, 0.0, 1.0))
     down = np.array(down)
     if len(feet) == 2:

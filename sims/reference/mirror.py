@@ -8,11 +8,12 @@ import numpy as np
 
 from ..ball.ball import Ball
 from ..ball.possession import Flight
-from ..model import pose
 from .reference import Reference
 
 FLIP = np.array([-1.0, 1.0, -1.0])
 """What the mirror does to a rotation vector: rotations about Y stay, about X and Z they turn round."""
+MIRROR = {"ball": np.array([*FLIP, 1.0]), "free": np.array([1.0, -1.0, 1.0, *FLIP, 1.0])}
+"""And to the coordinates of joints that turn."""
 
 
 def mirrored(model, reference: Reference) -> Reference:
@@ -22,20 +23,16 @@ def mirrored(model, reference: Reference) -> Reference:
     joint's partner is missing or bends about another axis.
     """
     out = np.array(reference.joint_q, dtype=float)
-    zero = pose.zero_q(model)
-    for name in model.joint_names:
-        other = partner(model, name)
-        q, theirs = reference.joint_q[:, model.q_slice(other)], model.q_slice(name)
-        if model.joint_type(name) == "hinge":
-            sign = float(FLIP * model.joint_axis(other) @ model.joint_axis(name))
+    for joint in model.joints:
+        other = model.joints[model.joint(partner(model, joint.name))]
+        q = reference.joint_q[:, other.q]
+        if joint.kind == "hinge":
+            sign = float(FLIP * other.axis @ joint.axis)
             if abs(abs(sign) - 1.0) > 1e-3:
-                raise ValueError(f"the joints '{name}' and '{other}' are no mirror images")
-            out[:, theirs] = zero[theirs] + np.sign(sign) * (q - zero[model.q_slice(other)])
+                raise ValueError(f"the joints '{joint.name}' and '{other.name}' are no mirror images")
+            out[:, joint.q] = joint.zero + np.sign(sign) * (q - other.zero)
         else:
-            turn = slice(theirs.stop - 4, theirs.stop)
-            out[:, turn] = q[:, -4:] * [*FLIP, 1.0]
-        if model.joint_type(name) == "free":
-            out[:, theirs.start : theirs.start + 3] = q[:, :3] * [1.0, -1.0, 1.0]
+            out[:, joint.q] = q * MIRROR[joint.kind]
     return replace(reference, joint_q=out)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..model import Model
 from ..planar import heading, over_ground, rotation, wrapped
 from ..signals import interpolate_lines, interpolate_rotations, smoothstep
 
@@ -63,7 +64,7 @@ class Cycle:
             raise ValueError(f"a cycle is repeated at least once, not {count} times")
         body = self.reference.joint_q[:-1]
         pieces, start = [], self.reference.joint_q[:1]
-        free = [model.q_slice(root_joint(model)), *self._carried(model)]
+        free = [model.q_slice(model.root), *self._carried(model)]
         for number in range(count):
             pieces.append(self._moved(body, free, number))
         pieces.append(self._moved(start, free, count))
@@ -71,8 +72,8 @@ class Cycle:
 
     def _carried(self, model) -> list[slice]:
         """Where what is loose and goes along, as a dribbled ball, is in joint_q."""
-        loose = [model.q_slice(n) for n in model.joint_names[1:] if model.joint_type(n) == "free"]
-        root, last = model.q_slice(root_joint(model)), self.reference.joint_q[-1]
+        loose = [joint.q for joint in model.joints[1:] if joint.kind == "free"]
+        root, last = model.q_slice(model.root), self.reference.joint_q[-1]
         anchor = self.reference.joint_q[0, root][:2]
         along = []
         for part in loose:
@@ -103,7 +104,7 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     [m] or `turn_above` [rad] from where it began; a smaller one is drift of somebody who stays in
     place, and is closed too.
     """
-    root = model.q_slice(root_joint(model))
+    root = model.q_slice(model.root)
     first, last = reference.joint_q[0], reference.joint_q[-1]
     turn = float(wrapped(heading(last[root][3:]) - heading(first[root][3:])))
     travel = last[root][:2] - first[root][:2]
@@ -116,7 +117,7 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     faster = _speed(model, reference, slice(0, 4)) - _speed(model, reference, slice(-4, None))
     if reference.frame_count < 8:
         faster[:] = 0.0
-    lines = model.dof_slice(root_joint(model)).start
+    lines = model.dof_slice(model.root).start
     ahead = rotation(turn) @ _speed(model, reference, slice(0, 4))[lines : lines + 2]
     faster[lines : lines + 2] += ahead - _speed(model, reference, slice(0, 4))[lines : lines + 2]
     span = min(BLEND, 0.5 * reference.duration)
@@ -134,64 +135,42 @@ def _speed(model, reference: Reference, rows: slice) -> np.ndarray:
     return difference(model, part[:-1], part[1:]).mean(axis=0) / reference.timestep
 
 
-def resample_q(model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:
+def resample_q(model: Model, joint_q: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Rows of joint_q (frames, nq) at fractional frame numbers `at` (n,): geodesics for
     rotations, lines for the rest."""
+    turns = model.coordinates.turn_q
     out = interpolate_lines(joint_q, at)
-    for start in model.quaternions():
-        place = slice(start, start + 4)
-        out[:, place] = interpolate_rotations(joint_q[:, place], at)
+    out[:, turns] = interpolate_rotations(joint_q[:, turns], at)
     return out
 
 
-def difference(model, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def difference(model: Model, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """The motion (..., nv) that carries joint coordinates `start` (..., nq) to `end` in unit
     time."""
-    out = np.zeros((*start.shape[:-1], model.nv))
-    for name in model.joint_names:
-        q, dof = model.q_slice(name), model.dof_slice(name)
-        if model.joint_type(name) == "hinge":
-            out[..., dof] = end[..., q] - start[..., q]
-        else:
-            turn = slice(q.stop - 4, q.stop)
-            out[..., dof.stop - 3 : dof.stop] = _turn(start[..., turn], end[..., turn])
-        if model.joint_type(name) == "free":
-            lines = slice(q.start, q.start + 3)
-            out[..., dof.start : dof.start + 3] = end[..., lines] - start[..., lines]
+    at, out = model.coordinates, np.zeros((*start.shape[:-1], model.nv))
+    out[..., at.line_dof] = end[..., at.line_q] - start[..., at.line_q]
+    before, after = (Rotation.from_quat(q[..., at.turn_q].reshape(-1, 4)) for q in (start, end))
+    turn = (before.inv() * after).as_rotvec()
+    out[..., at.turn_dof] = turn.reshape(*start.shape[:-1], *at.turn_dof.shape)
     return out
 
 
-def integrate(model, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def integrate(model: Model, start: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Joint coordinates (..., nq) reached from `start` by `motion` (..., nv) in unit time;
     undoes `difference`."""
-    out = np.array(start, dtype=float)
-    for name in model.joint_names:
-        q, dof = model.q_slice(name), model.dof_slice(name)
-        if model.joint_type(name) == "hinge":
-            out[..., q] += motion[..., dof]
-        else:
-            turn = slice(q.stop - 4, q.stop)
-            by = Rotation.from_rotvec(motion[..., dof.stop - 3 : dof.stop].reshape(-1, 3))
-            end = Rotation.from_quat(out[..., turn].reshape(-1, 4)) * by
-            out[..., turn] = end.as_quat().reshape(out[..., turn].shape)
-        if model.joint_type(name) == "free":
-            out[..., q.start : q.start + 3] += motion[..., dof.start : dof.start + 3]
+    at, out = model.coordinates, np.array(start, dtype=float)
+    out[..., at.line_q] += motion[..., at.line_dof]
+    before = Rotation.from_quat(out[..., at.turn_q].reshape(-1, 4))
+    after = before * Rotation.from_rotvec(motion[..., at.turn_dof].reshape(-1, 3))
+    out[..., at.turn_q] = after.as_quat().reshape(*out.shape[:-1], *at.turn_q.shape)
     return out
 
 
-def root_joint(model) -> str:
-    """Name of the free joint of the model's first tree. Raises ValueError when it has none."""
-    name = model.joint_names[0]
-    if model.joint_type(name) != "free":
-        raise ValueError(f"the model's first joint '{name}' is not free: it has no root to move")
-    return name
+def root_joint(model: Model) -> str:
+    """`Model.root`, for callers that still come here."""
+    return model.root
 
 
-def _joint_dofs(model) -> np.ndarray:
-    dofs = [model.dof_slice(n) for n in model.joint_names if model.joint_type(n) != "free"]
-    return np.concatenate([np.arange(d.start, d.stop) for d in dofs])
-
-
-def _turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    start, shape = Rotation.from_quat(start.reshape(-1, 4)), start.shape[:-1]
-    return (start.inv() * Rotation.from_quat(end.reshape(-1, 4))).as_rotvec().reshape(*shape, 3)
+def _joint_dofs(model: Model) -> np.ndarray:
+    """Where the velocities of all but free joints are in joint_qd."""
+    return np.concatenate([np.arange(model.nv)[joint.dof] for joint in model.joints if joint.kind != "free"])

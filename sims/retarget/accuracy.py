@@ -84,7 +84,7 @@ def accuracy(model, result: Retargeted) -> Accuracy:
     slide = np.concatenate(slides) if slides else np.zeros(1)
     slide = slide if len(slide) else np.zeros(1)
     every = np.concatenate(strict) if strict else np.zeros(1)
-    root = gaps.descendants(model, 0)
+    root = model.descendants(0)
     return Accuracy(
         limbs=limbs,
         mean=float(np.mean(list(errors.values()))),
@@ -113,12 +113,11 @@ def sole_points(foot, body_q: np.ndarray) -> np.ndarray:
 def beyond_limits(model, joint_q: np.ndarray) -> float:
     """[rad] farthest that any joint of joint_q (frames, nq) is beyond its range."""
     worst = 0.0
-    for joint in model.joint_names:
-        place, kind = model.q_slice(joint), model.joint_type(joint)
-        low, high = joint_range(model, joint)
-        if kind == "hinge":
-            angle = joint_q[:, place]
-            worst = max(worst, float((angle - high).max()), float((low - angle).max()))
-        elif kind == "ball":
-            worst = max(worst, float(Rotation.from_quat(joint_q[:, place]).magnitude().max() - high))
+    for joint in model.joints:
+        low, high = joint_range(joint)
+        q = joint_q[:, joint.q]
+        if joint.kind == "hinge":
+            worst = max(worst, float((q - high).max()), float((low - q).max()))
+        elif joint.kind == "ball":
+            worst = max(worst, float(Rotation.from_quat(q).magnitude().max() - high))
     return worst

@@ -3,12 +3,13 @@ limb, and a T-pose for recordings that have none."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..model import pose
+from ..model import Model, pose
 from ..recording.motion import Motion
 from .mapping import Mapping
 
@@ -18,9 +19,9 @@ LEFT = np.array([0.0, 1.0, 0.0])
 """The model's left in its zero pose."""
 
 
-def since_rest(motion: Motion):
-    """A function: joint -> Rotation (frames,), how far it has turned in the world since the T-pose."""
-    _, frames = motion.forward()
+def since_rest(motion: Motion, frames: np.ndarray) -> Callable[[str], Rotation]:
+    """A function: joint -> Rotation (frames,), how far it has turned in the world since the T-pose. frames:
+    (frames, joints, 4), joint frames in the world, of `Motion.forward`."""
     _, rest = motion.rest()
 
     def turned(joint: str) -> Rotation:
@@ -30,16 +31,17 @@ def since_rest(motion: Motion):
     return turned
 
 
-def match_limbs(model, motion: Motion, mapping: Mapping) -> dict[str, Rotation]:
+def match_limbs(
+    model: Model, motion: Motion, mapping: Mapping, turned: Callable[[str], Rotation]
+) -> dict[str, Rotation]:
     """Body of a limb -> what turns the model's zero pose into the recording's T-pose there.
 
     The limb's line is matched, and about it the hinge's axis, which the recording shows by how it bends.
-    Hands continue the line of their arm, feet do not.
+    Hands continue the line of their arm, feet do not. turned: of `since_rest`.
     """
     match = {}
-    turned = since_rest(motion)
     rest_at, _ = motion.rest()
-    zero = pose.forward(model, pose.zero_q(model))[0]
+    zero = model.zero_pose
     for hinge, (near, middle, far) in mapping.limbs.items():
         upper, lower, end = pose.limb_bodies(model, hinge)
         own = zero[end, :3] - zero[upper, :3]
@@ -81,7 +83,7 @@ def rest_by_directions(model, motion: Motion, mapping: Mapping) -> Motion:
     For files whose pose at zero angles is no T-pose. The pelvis is turned by its hips and spine, the bones
     after it by the smallest rotation from where they would be, so that nothing twists.
     """
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    zero = model.zero_pose[:, :3]
     wanted = _directions(model, zero, motion, mapping)
     at, frames = replace(
         motion, rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (len(motion.joint_names), 1))
@@ -107,7 +109,7 @@ def rest_by_directions(model, motion: Motion, mapping: Mapping) -> Motion:
 def _hip_bodies(model, mapping: Mapping) -> list[str]:
     """The bodies of both thighs, the left one first."""
     upper = [pose.limb_bodies(model, knee)[0] for knee in mapping.legs]
-    zero = pose.forward(model, pose.zero_q(model))[0]
+    zero = model.zero_pose
     return [model.body_names[b] for b in sorted(upper, key=lambda b: -zero[b, 1])]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps, pose
+from ..model import gaps
 from ..planar import wrapped
 from ..signals import runs, smoothstep
 
@@ -65,9 +65,9 @@ class Stand:
 
 def find_foot(model, body: str) -> Foot:
     """The sole of a foot body. Raises ValueError when no toes hang from it or it has no shape."""
-    zero = pose.forward(model, pose.zero_q(model))
+    zero = model.zero_pose[None]
     foot = model.body(body)
-    toes = [b for b, parent in enumerate(model.body_parent) if parent == foot]
+    toes = model.children(foot)
     boxes = [s for s in model.shapes if s.body == foot]
     if not toes or not boxes:
         raise ValueError(f"the body '{body}' is no foot: it needs a shape, and toes that hang from it")
@@ -81,7 +81,7 @@ def find_foot(model, body: str) -> Foot:
     for shape in (s for s in model.shapes if s.body == toes[0] and s.kind == "capsule"):
         along = Rotation.from_quat(shape.quat).apply([0.0, 0.0, shape.size[1]])
         tips = np.array([shape.pos - along, shape.pos + along])
-    return Foot(foot, toes[0], pose.body_joint(model, toes[0]), heel, ball, drop, corners, tips)
+    return Foot(foot, toes[0], model.body_joint(toes[0]), heel, ball, drop, corners, tips)
 
 
 def sole_heights(foot: Foot, ankle: np.ndarray, turn: Rotation) -> np.ndarray:

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps, pose
-from ..reference.reference import root_joint
+from ..model import Model, gaps, pose
+from ..model.joints import Joint
 
 STRETCH = 0.998
 """Of a leg's length that it is stretched to at most; a straight knee jerks."""
@@ -27,14 +27,13 @@ def reach(model, joint_q: np.ndarray, hinge: str, end: np.ndarray, turn: Rotatio
     with rotation `turn`; the hinge keeps its direction in the world, or takes `axis` (frames, 3)."""
     upper, lower, last = pose.limb_bodies(model, hinge)
     if axis is None:
-        body_q = pose.forward(model, joint_q)
-        axis = Rotation.from_quat(body_q[:, lower, 3:]).apply(model.joint_axis(hinge))
+        axis = _turn(model, joint_q, lower).apply(model.joint_axis(hinge))
     pose.place_limb(model, joint_q, hinge, end, turn, axis)
-    for joint in (pose.body_joint(model, upper), hinge, pose.body_joint(model, last)):
+    for joint in (model.body_joint(upper), hinge, model.body_joint(last)):
         keep_range(model, joint_q, joint)
     # a hinge or ball stopped by its range leaves the far body turned: its own joint makes up for it
-    beyond = Rotation.from_quat(pose.forward(model, joint_q)[:, lower, 3:])
-    wrist = pose.body_joint(model, last)
+    beyond = _turn(model, joint_q, lower)
+    wrist = model.body_joint(last)
     joint_q[:, model.q_slice(wrist)] = (beyond.inv() * turn).as_quat()
     keep_range(model, joint_q, wrist)
 
@@ -42,10 +41,10 @@ def reach(model, joint_q: np.ndarray, hinge: str, end: np.ndarray, turn: Rotatio
 def lift_out(model, joint_q: np.ndarray, hinge: str, end: np.ndarray | None, bodies: list[int]) -> None:
     """Raise the end of a limb, in place, by as much as its bodies are below the ground: from `end` (frames,
     3) [m], or from where it is."""
-    body_q = pose.forward(model, joint_q)
+    last = pose.limb_bodies(model, hinge)[2]
+    body_q = pose.forward(model, joint_q, {last, *bodies})
     low = gaps.lowest_point(model, body_q, bodies)
     if low.min() < -SUNK:
-        last = pose.limb_bodies(model, hinge)[2]
         end = body_q[:, last, :3] if end is None else end
         end = end - np.minimum(low, 0.0)[:, None] * [0.0, 0.0, 1.0]
         reach(model, joint_q, hinge, end, Rotation.from_quat(body_q[:, last, 3:]))
@@ -56,11 +55,12 @@ def lower_root(model, joint_q: np.ndarray, legs: dict[str, np.ndarray]) -> np.nd
 
     Returns by how much (frames,) [m], eased in and out.
     """
-    body_q = pose.forward(model, joint_q)
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    limbs = {hinge: pose.limb_bodies(model, hinge) for hinge in legs}
+    body_q = pose.forward(model, joint_q, [upper for upper, _, _ in limbs.values()])
+    zero = model.zero_pose[:, :3]
     needed = np.zeros(len(joint_q))
     for hinge, ankle in legs.items():
-        upper, lower, last = pose.limb_bodies(model, hinge)
+        upper, lower, last = limbs[hinge]
         length = np.linalg.norm(zero[lower] - zero[upper]) + np.linalg.norm(zero[last] - zero[lower])
         apart = body_q[:, upper, :3] - ankle
         room = np.maximum((STRETCH * length) ** 2 - np.sum(apart[:, :2] ** 2, axis=1), 0.0)
@@ -69,15 +69,16 @@ def lower_root(model, joint_q: np.ndarray, legs: dict[str, np.ndarray]) -> np.nd
     eased = gaussian_filter1d(
         maximum_filter1d(np.minimum(needed, LARGEST), window, mode="nearest"), window / 5.0, mode="nearest"
     )
-    joint_q[:, model.q_slice(root_joint(model)).start + 2] -= eased
+    joint_q[:, model.q_slice(model.root).start + 2] -= eased
     return eased
 
 
 def shrug(model, joint_q: np.ndarray, upper: int, goal: np.ndarray) -> None:
     """Turn the body before an upper arm, in place, so that the shoulder comes nearer to goal (frames, 3)
     [m]; by SHRUG at most."""
-    body_q = pose.forward(model, joint_q)
     clavicle = int(model.body_parent[upper])
+    before = int(model.body_parent[clavicle])
+    body_q = pose.forward(model, joint_q, (before, clavicle, upper))
     turn = Rotation.from_quat(body_q[:, clavicle, 3:])
     here, now = body_q[:, clavicle, :3], body_q[:, upper, :3]
     own, wanted = _unit(now - here), _unit(goal - here)
@@ -85,8 +86,8 @@ def shrug(model, joint_q: np.ndarray, upper: int, goal: np.ndarray) -> None:
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
     angle = np.arctan2(sine, np.sum(own * wanted, axis=1, keepdims=True))
     by = Rotation.from_rotvec(axis / np.maximum(sine, 1e-9) * SHRUG * np.tanh(angle / SHRUG))
-    above = Rotation.from_quat(body_q[:, model.body_parent[clavicle], 3:])
-    joint = pose.body_joint(model, clavicle)
+    above = Rotation.from_quat(body_q[:, before, 3:])
+    joint = model.body_joint(clavicle)
     joint_q[:, model.q_slice(joint)] = (above.inv() * by * turn).as_quat()
     keep_range(model, joint_q, joint)
 
@@ -95,7 +96,7 @@ def elbow_axis(model, joint_q: np.ndarray, hinge: str, elbow: np.ndarray, wrist:
     """Where the hinge's axis (frames, 3) should point for the elbow to come nearest to its goal (frames, 3)
     [m] with the wrist on its own; a nearly straight arm keeps the axis it has."""
     upper, lower, _ = pose.limb_bodies(model, hinge)
-    body_q = pose.forward(model, joint_q)
+    body_q = pose.forward(model, joint_q, (upper, lower))
     now = Rotation.from_quat(body_q[:, lower, 3:]).apply(model.joint_axis(hinge))
     shoulder = body_q[:, upper, :3]
     line = _unit(wrist - shoulder)
@@ -104,18 +105,23 @@ def elbow_axis(model, joint_q: np.ndarray, hinge: str, elbow: np.ndarray, wrist:
     return np.cross(off, line) + STRAIGHT * now
 
 
+def _turn(model: Model, joint_q: np.ndarray, body: int) -> Rotation:
+    """World rotation (frames,) of a body."""
+    return Rotation.from_quat(pose.forward(model, joint_q, [body])[:, body, 3:])
+
+
 def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def keep_range(model, joint_q: np.ndarray, joint: str) -> None:
     """Bring one joint of joint_q (frames, nq) into its range, in place."""
-    place, (low, high) = model.q_slice(joint), joint_range(model, joint)
-    if model.joint_type(joint) == "hinge":
-        joint_q[:, place] = np.clip(joint_q[:, place], low, high)
-    elif model.joint_type(joint) == "ball":
-        turn = Rotation.from_quat(joint_q[:, place])
-        joint_q[:, place] = within(turn, high).as_quat()
+    own = model.joints[model.joint(joint)]
+    low, high = joint_range(own)
+    if own.kind == "hinge":
+        joint_q[:, own.q] = np.clip(joint_q[:, own.q], low, high)
+    elif own.kind == "ball":
+        joint_q[:, own.q] = within(Rotation.from_quat(joint_q[:, own.q]), high).as_quat()
 
 
 def within(turn: Rotation, largest: float) -> Rotation:
@@ -125,11 +131,11 @@ def within(turn: Rotation, largest: float) -> Rotation:
     return Rotation.from_rotvec(vector * np.minimum(1.0, largest / np.maximum(angle, 1e-9)))
 
 
-def joint_range(model, joint: str) -> tuple[float, float]:
-    """[rad] limits of a joint (a ball joint's second is its largest angle), infinite where it has none."""
-    link = model.joint_link[model.joint(joint)]
-    if not model.tables["link_limited"][link]:
+def joint_range(joint: Joint) -> tuple[float, float]:
+    """[rad] limits to keep of a joint (a ball joint's second is its largest angle), a hundredth inside those
+    of the model; infinite where it has none."""
+    if joint.limits is None:
         return -np.inf, np.inf
-    low, high = (float(model.tables[f"link_{side}"][link]) for side in ("lower", "upper"))
+    low, high = joint.limits
     inside = 0.01 * (high - max(low, 0.0))
     return low + inside * (low < 0.0), high - inside

@@ -8,6 +8,7 @@ Places are the recording's, scaled by the length of the legs, with the ground br
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -15,9 +16,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps, pose
+from ..model import Model, pose
 from ..recording.motion import Motion
-from ..reference.reference import Reference, root_joint
+from ..reference.reference import Reference
 from ..signals import low_pass
 from .calibrate import match_limbs, rest_by_directions, since_rest
 from .mapping import Mapping, find_mapping
@@ -63,20 +64,22 @@ def retargeted(model, motion: Motion, mapping: Mapping | None = None, ik: bool =
     motion = mapping.plain(motion).resample(1.0 / model.timestep)
     if mapping.rest == "directions":
         motion = rest_by_directions(model, motion, mapping)
-    positions = motion.positions if motion.positions is not None else motion.forward()[0]
+    positions, frames = motion.forward()
+    positions = positions if motion.positions is None else motion.positions
     scale = leg_scale(model, motion, mapping)
     goals = {b: scale * positions[:, motion.index(j)] for b, j in goal_joints(model, mapping).items()}
 
-    turned = _body_rotations(model, motion, positions, mapping)
+    turned = _body_rotations(model, motion, positions, since_rest(motion, frames), mapping)
     joint_q = np.tile(np.asarray(model.start_q, dtype=float), (motion.frame_count, 1))
-    joint_q[:, model.q_slice(root_joint(model))] = _root(model, goals, mapping, turned)
+    joint_q[:, model.q_slice(model.root)] = _root(model, goals, mapping, turned)
     _fill_joints(model, joint_q, turned)
-    feet = {model.body_names[pose.limb_bodies(model, knee)[2]]: knee for knee in mapping.legs}
+    knees = {model.body_names[pose.limb_bodies(model, knee)[2]]: knee for knee in mapping.legs}
+    feet = {name: find_foot(model, name) for name in knees}
     ground = _ground(model, joint_q, goals, feet)
-    joint_q[:, model.q_slice(root_joint(model)).start + 2] -= ground
+    joint_q[:, model.q_slice(model.root).start + 2] -= ground
     goals = {body: goal - ground[:, None] * [0.0, 0.0, 1.0] for body, goal in goals.items()}
     out = Retargeted(Reference(joint_q, model.timestep), mapping, scale, goals, ground)
-    return _with_ik(model, out, feet) if ik else out
+    return _with_ik(model, out, feet, knees) if ik else out
 
 
 def goal_joints(model, mapping: Mapping) -> dict[str, str]:
@@ -89,7 +92,7 @@ def goal_joints(model, mapping: Mapping) -> dict[str, str]:
 
 def leg_scale(model, motion: Motion, mapping: Mapping) -> float:
     """[-] length of the model's legs over the recorded person's."""
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    zero = model.zero_pose[:, :3]
     own = theirs = 0.0
     for knee, joints in mapping.legs.items():
         bodies = pose.limb_bodies(model, knee)
@@ -99,19 +102,21 @@ def leg_scale(model, motion: Motion, mapping: Mapping) -> float:
     return float(own / theirs)
 
 
-def _with_ik(model, out: Retargeted, feet: dict[str, str]) -> Retargeted:
+def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[str, str]) -> Retargeted:
+    """The motion with feet planted and hands brought to their goals. feet, knees: of each leg by the foot's
+    name."""
     joint_q = out.reference.joint_q
-    body_q = pose.forward(model, joint_q)
+    body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
     stands, paths = {}, {}
-    for name in feet:
-        foot = find_foot(model, name)
+    for name, foot in feet.items():
         turn = Rotation.from_quat(body_q[:, foot.body, 3:])
         stands[name] = find_stands(foot, out.goals[name], turn, model.timestep)
         paths[name] = planted(foot, out.goals[name], turn, stands[name])
-    lowered = lower_root(model, joint_q, {feet[name]: paths[name][0] for name in feet})
-    for name, knee in feet.items():
-        _place_foot(model, joint_q, find_foot(model, name), knee, *paths[name])
-    body_q = pose.forward(model, joint_q)
+    lowered = lower_root(model, joint_q, {knees[name]: paths[name][0] for name in feet})
+    for name, foot in feet.items():
+        _place_foot(model, joint_q, foot, knees[name], *paths[name])
+    hands = [pose.limb_bodies(model, elbow)[2] for elbow in out.mapping.arms]
+    body_q = pose.forward(model, joint_q, hands)
     for elbow in out.mapping.arms:
         upper, lower, hand = pose.limb_bodies(model, elbow)
         places = [out.goals[model.body_names[b]] for b in (upper, lower, hand)]
@@ -119,7 +124,7 @@ def _with_ik(model, out: Retargeted, feet: dict[str, str]) -> Retargeted:
         axis = elbow_axis(model, joint_q, elbow, *places[1:])
         turn = Rotation.from_quat(body_q[:, hand, 3:])
         reach(model, joint_q, elbow, places[2], turn, axis)
-        lift_out(model, joint_q, elbow, places[2], gaps.descendants(model, hand))
+        lift_out(model, joint_q, elbow, places[2], model.descendants(hand))
     return Retargeted(out.reference, out.mapping, out.scale, out.goals, out.ground, stands, lowered)
 
 
@@ -135,10 +140,9 @@ def _place_foot(model, joint_q: np.ndarray, foot: Foot, knee: str, place, turn: 
 def _ground(model, joint_q: np.ndarray, goals, feet) -> np.ndarray:
     """Height (frames,) [m] of the ground under the recording: constant where the clip is short, else
     following what the soles come down to, of our feet on the recording's ankles."""
-    body_q = pose.forward(model, joint_q)
+    body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
     low = []
-    for name in feet:
-        foot = find_foot(model, name)
+    for name, foot in feet.items():
         turn = Rotation.from_quat(body_q[:, foot.body, 3:])
         low.append(sole_heights(foot, goals[name], turn).min(axis=1))
     low = gaussian_filter1d(np.min(low, axis=0), 0.03 / model.timestep, mode="nearest")
@@ -147,10 +151,16 @@ def _ground(model, joint_q: np.ndarray, goals, feet) -> np.ndarray:
     return gaussian_filter1d(ground, GROUND[1] / model.timestep, mode="nearest")
 
 
-def _body_rotations(model, motion: Motion, positions, mapping: Mapping) -> dict[str, Rotation]:
+def _body_rotations(
+    model: Model,
+    motion: Motion,
+    positions: np.ndarray,
+    since: Callable[[str], Rotation],
+    mapping: Mapping,
+) -> dict[str, Rotation]:
     """World rotation of each mapped body of the model: turn of the recorded joint since the T-pose, times
     the match."""
-    match, since = match_limbs(model, motion, mapping), since_rest(motion)
+    match = match_limbs(model, motion, mapping, since)
     turned = {}
     for body, joint in mapping.bodies.items():
         turned[body] = since(joint) * match.get(body, Rotation.identity())
@@ -163,7 +173,7 @@ def _body_rotations(model, motion: Motion, positions, mapping: Mapping) -> dict[
 
 def _palm(model, hand: str, places) -> Rotation:
     """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]."""
-    zero = pose.forward(model, pose.zero_q(model))[0, :, :3]
+    zero = model.zero_pose[:, :3]
     side = hand.removesuffix("hand")
     own = [zero[model.body(hand)]] + [zero[model.body(f"{side}{f}_1")] for f in ("index", "middle", "pinky")]
     wrist, index, middle, little = places
@@ -177,14 +187,14 @@ def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> Non
 
     A joint's own rotation is what brings its body, now at the zero angle, to the wanted world rotation.
     """
-    zero = pose.zero_q(model)
+    zero = model.zero_q
     for body, name in enumerate(model.body_names):
         if name not in turned or model.body_parent[body] < 0:
             continue
-        joint = pose.body_joint(model, body)
+        joint = model.body_joint(body)
         q = model.q_slice(joint)
         joint_q[:, q] = zero[q]
-        now = Rotation.from_quat(pose.forward(model, joint_q)[:, body, 3:])
+        now = Rotation.from_quat(pose.forward(model, joint_q, [body])[:, body, 3:])
         wanted = now.inv() * turned[name]
         if model.joint_type(joint) == "ball":
             joint_q[:, q] = wanted.as_quat()
@@ -195,10 +205,10 @@ def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> Non
 
 def _root(model, goals, mapping: Mapping, turned) -> np.ndarray:
     """Root poses (frames, 7): the middle of the hips is where the scaled recording has it."""
-    zero = pose.forward(model, pose.zero_q(model))[0]
+    zero = model.zero_pose
     hips = [pose.limb_bodies(model, knee)[0] for knee in mapping.legs]
     middle = np.mean([goals[model.body_names[b]] for b in hips], axis=0)
-    root = pose.joint_body(model, root_joint(model))
+    root = model.joint_body(model.root)
     facing = turned[model.body_names[root]]
     position = middle - facing.apply(zero[hips, :3].mean(axis=0) - zero[root, :3])
     return np.concatenate([position, facing.as_quat()], axis=1)

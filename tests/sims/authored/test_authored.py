@@ -54,7 +54,7 @@ def test_palms_hold_the_ball_and_nothing_passes_through_it(player, clip, body_q)
         palm = gaps.gap_to_bodies(player, body_q, [player.body(f"{side}_hand")], ball) - R
         held = clip.ball.touch[:, hand]
         assert np.abs(palm[held]).max(initial=0.0) < 0.003
-        fingers = gaps.descendants(player, player.body(f"{side}_hand"))
+        fingers = player.descendants(player.body(f"{side}_hand"))
         assert gaps.gap_to_bodies(player, body_q, fingers, ball).min() - R > -0.008
     trunk = [player.body(name) for name in TRUNK]
     assert gaps.gap_to_bodies(player, body_q, trunk, ball).min() - R > 0.005
@@ -63,7 +63,7 @@ def test_palms_hold_the_ball_and_nothing_passes_through_it(player, clip, body_q)
 def test_hands_stay_outside_the_body(player, body_q):
     trunk = [player.body(name) for name in TRUNK]
     for side in "lr":
-        for body in gaps.descendants(player, player.body(f"{side}_lower_arm")):
+        for body in player.descendants(player.body(f"{side}_lower_arm")):
             assert gaps.gap_to_bodies(player, body_q, trunk, body_q[:, body, :3]).min() > 0.03
 
 

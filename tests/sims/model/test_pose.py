@@ -36,10 +36,42 @@ def test_forward_kinematics_equal_mujoco(player):
 
 
 def test_bodies_of_the_zero_pose_are_aligned_with_the_world(player):
-    body_q = pose.forward(player, pose.zero_q(player))[0]
+    body_q = player.zero_pose
     assert np.allclose(np.abs(body_q[:, 6]), 1.0)
     assert body_q[player.body("l_hand"), 1] > 0.5 > -0.5 > body_q[player.body("r_hand"), 1]
     assert body_q[player.body("l_toes"), 0] > body_q[player.body("l_foot"), 0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_some_bodies_are_where_all_have_them(player, seed):
+    """To the bit; the others are nowhere."""
+    random = np.random.default_rng(seed)
+    bodies = set(random.integers(-1, player.nbody, size=seed).tolist())
+    joint_q = random_q(player, 3, seed)
+    some, all_of_them = pose.forward(player, joint_q, bodies), pose.forward(player, joint_q)
+    for body in range(player.nbody):
+        if body in bodies:
+            np.testing.assert_array_equal(some[:, body], all_of_them[:, body])
+        else:
+            assert np.isnan(some[:, body]).all()
+
+
+def test_a_limb_of_the_world_is_placed(tmp_path):
+    """The body above it is no body."""
+    path = tmp_path / "arm.xml"
+    path.write_text("""<mujoco><worldbody>
+        <body name="a" pos="0 0 1"><joint name="s" type="ball"/><geom size="0.1"/>
+        <body name="b" pos="0 0 -.4"><joint name="e" axis="0 1 0"/><geom size="0.1"/>
+        <body name="c" pos="0 0 -.4"><joint name="w" type="ball"/><geom size="0.1"/></body></body></body>
+        <body name="z" pos="5 5 5"><joint name="zz" type="ball"/><geom size="0.1"/></body>
+        </worldbody></mujoco>""")
+    model = Model.load(path)
+    q = random_q(model, 1, seed=3)
+    end, turn = np.array([0.3, -0.2, 0.6]), Rotation.random(1, random_state=0)
+    pose.place_limb(model, q, "e", end, turn, [0.0, 1.0, 0.3])
+    placed = pose.forward(model, q)[0, model.body("c")]
+    np.testing.assert_allclose(placed[:3], end, atol=1e-12)
+    assert (Rotation.from_quat(placed[3:]).inv() * turn).magnitude().max() < 1e-7
 
 
 def test_twist_is_the_nearest_angle_about_an_axis():
