@@ -42,11 +42,6 @@ def gap_to_bodies(model, body_q: np.ndarray, bodies, points: np.ndarray) -> np.n
     return np.min(distances, axis=0)
 
 
-def descendants(model, body: int) -> list[int]:
-    """`Model.descendants`, for callers that still come here."""
-    return model.descendants(body)
-
-
 def _place(shape, body_q: np.ndarray) -> tuple[np.ndarray, Rotation]:
     body = Rotation.from_quat(body_q[:, shape.body, 3:])
     return body_q[:, shape.body, :3] + body.apply(shape.pos), body * Rotation.from_quat(shape.quat)

@@ -53,11 +53,6 @@ def forward(model: Model, joint_q: ArrayLike, bodies: Iterable[int] | None = Non
     return body_q
 
 
-def joint_body(model: Model, joint: str) -> int:
-    """`Model.joint_body`, for callers that still come here."""
-    return model.joint_body(joint)
-
-
 def twist(turn: Rotation, axis: np.ndarray) -> np.ndarray:
     """The angle (frames,) [rad] about `axis` that comes nearest to each rotation."""
     q = turn.as_quat()

@@ -166,11 +166,6 @@ def integrate(model: Model, start: np.ndarray, motion: np.ndarray) -> np.ndarray
     return out
 
 
-def root_joint(model: Model) -> str:
-    """`Model.root`, for callers that still come here."""
-    return model.root
-
-
 def _joint_dofs(model: Model) -> np.ndarray:
     """Where the velocities of all but free joints are in joint_qd."""
     return np.concatenate([np.arange(model.nv)[joint.dof] for joint in model.joints if joint.kind != "free"])
