@@ -19,6 +19,7 @@ from ..sims.worlds.simulation import SWEEPS
 from .mjwarp import MuJoCoWarp
 from .mujoco import SETTINGS, MuJoCo
 from .ours import Ours, solver_error
+from .reset import Reset, print_reset, reset
 from .scene import hold
 
 HELD = 20
@@ -192,8 +193,8 @@ def print_solve(rows: list[dict[str, float]]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    options: Step | Solve = tyro.extras.subcommand_cli_from_dict(
-        {"step": Step, "solve": Solve}, args=arguments, prog="warpdribble bench"
+    options: Step | Solve | Reset = tyro.extras.subcommand_cli_from_dict(
+        {"step": Step, "solve": Solve, "reset": Reset}, args=arguments, prog="warpdribble bench"
     )
     if isinstance(options, Step):
         result = step(options)
@@ -205,6 +206,13 @@ def main(arguments: list[str] | None = None) -> int:
         if options.out:
             with options.out.open("a") as file:
                 file.write(line + "\n")
+    elif isinstance(options, Reset):
+        quiet_warp()
+        found = reset(options)
+        if options.format == "json":
+            print(json.dumps(found))
+        else:
+            print_reset(options, found)
     else:
         rows = solve(options)
         if options.format == "json":

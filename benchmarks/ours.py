@@ -72,7 +72,7 @@ class Ours:
 
 def solver_error(scene: Scene, sweeps: int, fragments: int = 12) -> float:
     """Largest joint velocity error [rad/s] that `sweeps` leave in a step, beside a solve of 400 sweeps
-    from the same state and warm start; median over worlds and steps."""
+    from the same state and warm start; median over worlds and the last steps of fragments."""
     worlds = min(64, scene.targets.shape[1])
     usual = Simulation(scene.model, worlds, sweeps=sweeps)
     exact = Simulation(scene.model, worlds, sweeps=400)

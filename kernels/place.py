@@ -30,12 +30,13 @@ class Block:
 
 
 @wp.func_native(f"""
-int base[{LANES}];
+int base[{LANES}], some = 0;
 for (int lane = 0; lane < {LANES}; ++lane) {{
     int w = g * {LANES} + lane, last = rows.shape[0] - 1, row = rows.data[w < last ? w : last];
     base[lane] = row < 0 ? -1 : source.start + row / source.lanes * source.group_stride + row % source.lanes;
+    some |= row >= 0;
 }}
-for (int i = 0; i < to.n; ++i)
+for (int i = 0; i < (some ? to.n : 0); ++i)
     for (int k = 0; k < to.parts; ++k) {{
         float *here = state.data + to.start + g * to.group_stride + i * to.stride + k * {LANES};
         const float *there = pool.data + i * source.stride + k * source.lanes;

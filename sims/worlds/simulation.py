@@ -12,7 +12,7 @@ import warp as wp
 
 from ..model import Model
 from .batch import Batch
-from .state import State
+from .state import Layout, State
 from .tensors import Tensors, as_array
 
 SWEEPS = 10
@@ -74,6 +74,7 @@ class Simulation(Batch):
         self._targets_set = False
         self._ports: dict[str, wp.array] = {}
         self._row = self.new_rows()
+        self._pool_blocks: tuple[Layout, wp.array] | None = None
         inputs = [self._row, self._carried, self._blocks, self._carried, self._blocks]
         self._copy = self.prepared(self.program("place"), "place", inputs)
         self.reset()
@@ -169,8 +170,9 @@ class Simulation(Batch):
             raise ValueError(f"rows must be {self.world_count} whole numbers, one for each world")
         if rows.max(initial=-1) >= len(pool) or rows.min(initial=0) < -1:
             raise IndexError(f"rows must lie in -1 .. {len(pool) - 1}")
-        same = pool.layout == self._layout
-        blocks = self._blocks if same else self._block_table(pool.layout)
+        if self._pool_blocks is None or self._pool_blocks[0] != pool.layout:
+            self._pool_blocks = pool.layout, self._block_table(pool.layout)
+        blocks = self._pool_blocks[1]
         self.set_rows(self._row, rows)
         with self._changing():
             inputs = [self._row, pool.data.to(self.device), blocks, self._carried, self._blocks]
