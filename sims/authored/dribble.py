@@ -9,6 +9,7 @@ every push; arms and legs are solved for hands and feet.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +17,11 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
+from ..ball.flight import GRAVITY, Bounce
 from ..model import pose
 from ..reference.reference import Reference, resample_q
 
-GRAVITY = 9.81
+Heights = Callable[[np.ndarray], np.ndarray]
 HAND_YAW = np.radians(18.0)
 """Of the fingers on the ball, from straight ahead toward the left."""
 
@@ -82,8 +84,7 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
     times = np.arange(steps + 1) * model.timestep
     period = steps * model.timestep
     style = replace(style, period=period)
-    ball_body = model.body("ball")
-    radius = next(s.size[0] for s in model.shapes if s.body == ball_body)
+    radius = model.ball_radius
     flight, ball_height, palm_height = stroke(style, radius)
     phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
 
@@ -106,6 +107,23 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
     )
 
 
+@dataclass(frozen=True)
+class Push:
+    """The ball in the hand: its acceleration is -g - k t. The push grows from nothing, so the hand never has
+    to pull."""
+
+    catch: float
+    """[m] height at which the hand meets it"""
+    back: float
+    """[m/s] upward, with which it comes"""
+    growth: float
+    """[m/s^3], k"""
+
+    def at(self, since: np.ndarray) -> np.ndarray:
+        """Height [m] `since` seconds after the catch."""
+        return self.catch + self.back * since - 0.5 * GRAVITY * since**2 - self.growth * since**3 / 6.0
+
+
 def release_speed(style: Dribble, radius: float) -> float:
     """The speed [m/s] at which the ball has to leave the hand for the cycle to close.
 
@@ -120,52 +138,38 @@ def release_speed(style: Dribble, radius: float) -> float:
     return brentq(lambda v: _cycle(style, radius, v)[-1], speeds[k], speeds[k + 1])
 
 
-def _cycle(style: Dribble, radius: float, v: float):
-    """Time down and up, height and speed at the catch, growth of the push, height missed at the
-    end.
-
-    In flight the ball falls freely and leaves the ground with e times the speed it came with. In
-    the hand its acceleration is -g - k t: the push grows from nothing, so the hand never has to
-    pull.
-    """
-    fall = style.release_height - radius
-    impact = np.sqrt(v**2 + 2.0 * GRAVITY * fall)
-    down = (impact - v) / GRAVITY
-    up = style.period - style.hold - down
-    back = style.restitution * impact - GRAVITY * up
-    catch = radius + style.restitution * impact * up - 0.5 * GRAVITY * up**2
-    t = style.hold
-    k = 2.0 * (back + v - GRAVITY * t) / t**2
-    end = catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
-    return down, up, catch, back, k, end - style.release_height
+def _cycle(style: Dribble, radius: float, v: float) -> tuple[Bounce, float, Push, float]:
+    """A cycle that begins at speed v [m/s]: the bounce, the time from the ground up to the hand [s], the
+    push, and the height that is missed at its end [m]."""
+    bounce = Bounce(style.release_height, v, radius, style.restitution)
+    up = style.period - style.hold - bounce.down
+    back, hold = style.restitution * bounce.impact - GRAVITY * up, style.hold
+    push = Push(bounce.rising(up), back, 2.0 * (back + v - GRAVITY * hold) / hold**2)
+    return bounce, up, push, push.at(hold) - style.release_height
 
 
-def stroke(style: Dribble, radius: float):
-    """Heights of the ball and of the palm as functions of the time since the release."""
+def stroke(style: Dribble, radius: float) -> tuple[float, Heights, Heights]:
+    """How long the ball is in flight [s], and heights of the ball and of the palm [m] as functions of the
+    time since the release [s]."""
     v = release_speed(style, radius)
-    down, up, catch, back, k, _ = _cycle(style, radius, v)
-    if min(up, k) < 0.0:
+    bounce, up, push, _ = _cycle(style, radius, v)
+    if min(up, push.growth) < 0.0:
         raise ValueError("this dribble holds the ball too long to push it down")
-    flight = down + up
-    impact = v + GRAVITY * down
+    flight = bounce.down + up
 
-    def carried(t):
-        t = np.maximum(t - flight, 0.0)
-        return catch + back * t - 0.5 * GRAVITY * t**2 - k * t**3 / 6.0
+    def carried(t: np.ndarray) -> np.ndarray:
+        return push.at(np.maximum(t - flight, 0.0))
 
-    def ball(t):
-        falling = style.release_height - v * t - 0.5 * GRAVITY * t**2
-        since = t - down
-        rising = radius + style.restitution * impact * since - 0.5 * GRAVITY * since**2
-        return np.where(t < down, falling, np.where(t < flight, rising, carried(t)))
+    def ball(t: np.ndarray) -> np.ndarray:
+        return np.where(t < flight, bounce.at(t), carried(t))
 
     touch = style.release_height + radius
     turn = 2.0 * (touch - style.lowest_palm) / v
     empty = CubicHermiteSpline(
-        [0.0, turn, flight], [touch, style.lowest_palm, catch + radius], [-v, 0.0, back]
+        [0.0, turn, flight], [touch, style.lowest_palm, push.catch + radius], [-v, 0.0, push.back]
     )
 
-    def palm(t):
+    def palm(t: np.ndarray) -> np.ndarray:
         return np.where(t < flight, empty(np.minimum(t, flight)), carried(t) + radius)
 
     return flight, ball, palm
@@ -227,7 +231,7 @@ def _right_arm(model, joint_q, under, radius: float, tilt, roll: float) -> None:
     The fingers point ahead, `tilt` (frames,) [rad] below the horizon.
     """
     hand = model.body("r_hand")
-    shape = next(s for s in model.shapes if s.body == hand)
+    shape = model.first_shape(hand)
     centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
     turn = Rotation.from_euler("ZYX", np.column_stack([0 * tilt + HAND_YAW, tilt, 0 * tilt + roll]))
     turn = turn * Rotation.from_euler("z", 0.5 * np.pi)  # fingers, -Y in the zero pose, to +X

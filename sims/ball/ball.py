@@ -139,8 +139,7 @@ def _fly(path: np.ndarray, hands: Hands, way: Flight) -> None:
     times = np.arange(1, min(way.catch, len(path) - 1) - way.release + 2) * hands.timestep
     if way.catch >= len(path):
         velocity = hands.velocity[way.release - 1, way.hand].copy()
-        needed = np.sqrt(2.0 * flight.GRAVITY * max(start[2] - hands.radius, 0.0) * (flight.BOUNCE**-2 - 1.0))
-        velocity[2] = -max(needed, -velocity[2])
+        velocity[2] = -max(flight.speed_to_return(start[2], hands.radius), -velocity[2])
         path[way.release :] = flight.thrown(start, velocity, times[: len(path) - way.release], hands.radius)
         return
     end = hands.centre[way.catch, way.next_hand]
@@ -148,7 +147,7 @@ def _fly(path: np.ndarray, hands: Hands, way: Flight) -> None:
     inside = slice(way.release, way.catch + 1)
     path[inside] = start + (times / times[-1])[:, None] * (end - start)
     if speed is not None:
-        path[inside, 2] = flight.flight_height(times, start[2], speed, hands.radius)
+        path[inside, 2] = flight.Bounce(start[2], speed, hands.radius).at(times)
 
 
 def _height(hands: Hands, touch: np.ndarray, row: int) -> float:

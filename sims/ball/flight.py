@@ -2,42 +2,70 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from scipy.optimize import brentq
 
 GRAVITY, BOUNCE = 9.81, 0.8
+"""[m/s^2] and [-], of the ball in references; the simulated one has its model's."""
 FASTEST = 15.0
 """[m/s] at which a ball leaves a hand."""
 
 
-def time_to_ground(height: float, speed: float, radius: float) -> float:
-    """[s] until a ball that leaves `height` [m] downward at `speed` [m/s] touches the ground."""
-    impact = np.sqrt(speed**2 + 2.0 * GRAVITY * max(height - radius, 0.0))
-    return float((impact - speed) / GRAVITY)
+@dataclass(frozen=True)
+class Bounce:
+    """A ball that leaves `height` [m] downward at `speed` [m/s], falls and comes back from the ground."""
 
+    height: float
+    """[m] of its centre"""
+    speed: float
+    radius: float
+    """[m]"""
+    restitution: float = BOUNCE
 
-def flight_height(since: np.ndarray, height: float, speed: float, radius: float) -> np.ndarray:
-    """Height [m] of the ball's centre `since` seconds after it left `height` downward at `speed` [m/s], up to
-    its second time on the ground."""
-    impact = np.sqrt(speed**2 + 2.0 * GRAVITY * max(height - radius, 0.0))
-    down = (impact - speed) / GRAVITY
-    up = np.maximum(since - down, 0.0)
-    rising = radius + BOUNCE * impact * up - 0.5 * GRAVITY * up**2
-    return np.where(since < down, height - speed * since - 0.5 * GRAVITY * since**2, rising)
+    @cached_property
+    def impact(self) -> float:
+        """[m/s] at which it meets the ground"""
+        return np.sqrt(self.speed**2 + 2.0 * GRAVITY * max(self.height - self.radius, 0.0))
+
+    @cached_property
+    def down(self) -> float:
+        """[s] until it does"""
+        return float((self.impact - self.speed) / GRAVITY)
+
+    def falling(self, since: np.ndarray) -> np.ndarray:
+        """Height [m] `since` seconds after it was let go, before the ground."""
+        return self.height - self.speed * since - 0.5 * GRAVITY * since**2
+
+    def rising(self, after: np.ndarray) -> np.ndarray:
+        """Height [m] `after` seconds on from the ground, up to the second time there."""
+        return self.radius + self.restitution * self.impact * after - 0.5 * GRAVITY * after**2
+
+    def at(self, since: np.ndarray) -> np.ndarray:
+        """Height [m] `since` seconds after it was let go, up to its second time on the ground."""
+        rising = self.rising(np.maximum(since - self.down, 0.0))
+        return np.where(since < self.down, self.falling(since), rising)
 
 
 def speed_to_meet(height: float, after: float, duration: float, radius: float) -> float | None:
     """Downward speed [m/s] with which a ball bounces once from `height` to the height `after` [m] in
     `duration` [s]; None when there is none."""
 
-    def missed(speed):
-        return float(flight_height(np.array(duration), height, speed, radius)) - after
+    def missed(speed: float) -> float:
+        return float(Bounce(height, speed, radius).at(np.array(duration))) - after
 
     speeds = np.linspace(-2.0, FASTEST, 171)
-    low = next((v for v in speeds if time_to_ground(height, v, radius) < duration), None)
+    low = next((v for v in speeds if Bounce(height, v, radius).down < duration), None)
     if low is None or missed(low) > 0.0 or missed(FASTEST) < 0.0:
         return None
     return float(brentq(missed, low, FASTEST))
+
+
+def speed_to_return(height: float, radius: float) -> float:
+    """Downward speed [m/s] with which a ball comes back to just the `height` [m] that it leaves."""
+    return np.sqrt(2.0 * GRAVITY * max(height - radius, 0.0) * (BOUNCE**-2 - 1.0))
 
 
 def thrown(place: np.ndarray, velocity: np.ndarray, times: np.ndarray, radius: float) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
 from ..signals import runs
-from .flight import BOUNCE, GRAVITY, flight_height, time_to_ground
+from .flight import BOUNCE, GRAVITY, Bounce
 from .hands import SMOOTH, Hands
 
 PUSH = 1.3
@@ -192,13 +192,12 @@ def _flight(hands: Hands, push: tuple[int, int], after: tuple[int, int] | None, 
 def _meets(hands: Hands, row: int, hand: int, other: int, release: int, last: int) -> int:
     """First row, up to `last`, at which the bounced ball is as high as the hand that catches it; where it
     seems to pass below, the one at which that hand comes up fastest."""
-    speed = -FLICK * hands.velocity[row, hand, 2]
-    height = hands.centre[row, hand, 2]
-    first = max(release + 2, row + round(time_to_ground(height, speed, hands.radius) / hands.timestep))
+    bounce = Bounce(hands.centre[row, hand, 2], -FLICK * hands.velocity[row, hand, 2], hands.radius)
+    first = max(release + 2, row + round(bounce.down / hands.timestep))
     rows = np.arange(first, last)
     if not len(rows):
         return int(last)
-    ball = flight_height((rows - row) * hands.timestep, height, speed, hands.radius)
+    ball = bounce.at((rows - row) * hands.timestep)
     met = np.flatnonzero(ball > hands.centre[rows, other, 2] - REACHES)
     if len(met):
         return int(rows[met[0]])

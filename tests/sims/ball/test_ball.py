@@ -6,7 +6,7 @@ from warpdribble.sims import Model
 from warpdribble.sims.authored.catalogue import authored_clip
 from warpdribble.sims.ball.ball import find_checkpoints, flights_of, inferred_ball, recorded_ball
 from warpdribble.sims.ball.contact_score import score_contacts
-from warpdribble.sims.ball.flight import flight_height, speed_to_meet, thrown, time_to_ground
+from warpdribble.sims.ball.flight import Bounce, speed_to_meet, speed_to_return, thrown
 from warpdribble.sims.reference.reference import Cycle
 from warpdribble.sims.retarget.retarget import retargeted
 
@@ -27,11 +27,35 @@ def retargeted_clip(player, mocap, name):
     ("height", "after", "duration"), [(0.8, 0.9, 0.45), (0.6, 0.6, 0.3), (1.0, 0.8, 0.8)]
 )
 def test_a_flight_ends_where_it_should(height, after, duration):
-    speed = speed_to_meet(height, after, duration, R)
-    assert flight_height(np.array(duration), height, speed, R) == pytest.approx(after, abs=1e-6)
-    lands = time_to_ground(height, speed, R)
-    before, behind = (flight_height(np.array(lands + d), height, speed, R) for d in (-1e-4, 1e-4))
+    bounce = Bounce(height, speed_to_meet(height, after, duration, R), R)
+    assert bounce.at(np.array(duration)) == pytest.approx(after, abs=1e-6)
+    before, behind = (bounce.at(np.array(bounce.down + d)) for d in (-1e-4, 1e-4))
     assert (behind - R) / (before - R) == pytest.approx(0.8, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("height", "speed", "restitution"), [(1.0, 2.0, 0.8), (0.7, -1.5, 0.8), (0.9, 3.0, 0.6)]
+)
+def test_a_bounce_is_the_motion_under_gravity(height, speed, restitution):
+    """Stepped in small times."""
+    bounce, h, end = Bounce(height, speed, R, restitution), 1e-5, 0.5
+    z, v, path = height, -speed, []
+    for _ in range(round(end / h)):
+        path.append(z)
+        z, v = z + v * h - 0.5 * 9.81 * h * h, v - 9.81 * h
+        if z < R:
+            z, v = R, restitution * abs(v)
+    since = np.arange(len(path)) * h
+    second = bounce.down + 2.0 * restitution * bounce.impact / 9.81
+    inside = since < min(end, second)
+    np.testing.assert_allclose(bounce.at(since)[inside], np.array(path)[inside], atol=2e-4)
+
+
+@pytest.mark.parametrize("height", [0.5, 1.0, R, 0.0])
+def test_a_ball_comes_back(height):
+    bounce = Bounce(height, speed_to_return(height, R), R)
+    top = bounce.rising(np.linspace(0.0, 1.5, 100_001)).max()
+    assert top == pytest.approx(max(height, R), abs=1e-6)
 
 
 def test_a_flight_that_cannot_be_is_none():
