@@ -25,6 +25,8 @@ if TYPE_CHECKING:
         Simulation,
         State,
         Watch,
+        terms,
+        watch,
     )
 
 __all__ = [
@@ -54,6 +56,8 @@ __all__ = [
     "read_mapping",
     "recorded_ball",
     "retargeted",
+    "terms",
+    "watch",
 ]
 
 __getattr__, __dir__ = lazily(
@@ -65,6 +69,6 @@ __getattr__, __dir__ = lazily(
         ".recording": "Motion",
         ".reference": "Cycle Reference close_cycle mirrored",
         ".retarget": "MappingError find_mapping read_mapping retargeted",
-        ".worlds": "Simulation Contacts State Course Probe Watch NONFINITE FALL BAD_CONTACT OVERSPEED",
+        ".worlds": "Simulation Contacts State Course Probe Watch terms watch NONFINITE FALL BAD_CONTACT OVERSPEED",
     },
 )

@@ -16,7 +16,11 @@ def lazily(package: str, modules: dict[str, str]) -> tuple[Callable[[str], Any],
     def getattr_(name: str) -> Any:
         if name not in names:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(names[name], package), name)
+        module = import_module(names[name], package)
+        try:
+            value = getattr(module, name)
+        except AttributeError:  # the name is that of a module
+            value = import_module(f"{names[name]}.{name}", package)
         setattr(sys.modules[package], name, value)
         return value
 
