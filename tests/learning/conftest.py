@@ -28,13 +28,14 @@ def dribble(player):
 
 @pytest.fixture(scope="session")
 def graph(player, dribble):
-    return cyclic_graph(player, dribble)
+    return cyclic_graph(player, dribble, player.roles.both("feet"), "dribble")
 
 
 @pytest.fixture(scope="session")
 def standing(player):
     """A graph of a pose held."""
-    return cyclic_graph(player, Cycle(Reference(np.tile(player.start_q, (26, 1)), player.timestep)))
+    still = Reference(np.tile(player.start_q, (26, 1)), player.timestep)
+    return cyclic_graph(player, Cycle(still), player.roles.both("feet"))
 
 
 @pytest.fixture

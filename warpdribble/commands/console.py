@@ -44,9 +44,12 @@ def warmed(task: Task) -> Task:
     """A task that has compiled what it needs."""
     import numpy as np
 
-    worlds = np.arange(task.worlds)
-    task.advance(0 * worlds, np.zeros((task.worlds, task.actions)))
-    task.become(worlds)
+    from ..learning import Ahead, OpenLoop, Rollout, Streams, reference_starts
+
+    starts = reference_starts(task.graph).draw(Streams([np.random.default_rng(0)], task.worlds))
+    rollout = Rollout(task, OpenLoop(task.actions), Ahead(), starts)
+    for _ in rollout.fragments(1):
+        rollout.become(np.arange(task.worlds))
     task.sim.bodies()
     return task
 
