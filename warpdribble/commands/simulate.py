@@ -57,7 +57,7 @@ class Simulate(ClipInput, Outputs):
         model = Model.load(self.model)
         one = stage_skill(model, self._skill())
         reference = one.reference
-        say(f"skill     {one.skill.name}: {one.skill.description}, {reference.duration:.2f} s")
+        say(f"{'clip' if one.skill.is_clip else 'skill':9} {_title(one)}, {reference.duration:.2f} s")
         for note in one.notes:
             say(f"          {note}")
         _check_length(reference, self.repeat)
@@ -163,7 +163,7 @@ def _check_length(reference: Reference, repeat: int) -> None:
 
 
 def _title(one: StagedSkill) -> str:
-    return one.skill.description if one.skill.is_clip else f"skill {one.skill.name}"
+    return one.skill.description if one.skill.is_clip else f"{one.skill.name}: {one.skill.description}"
 
 
 def _record(
