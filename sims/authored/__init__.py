@@ -1,4 +1,8 @@
-"""Clips written by our own code instead of recorded: what a fresh machine has without any download."""
+"""Clips written by our own code instead of recorded: what a fresh machine has without any download.
+
+They are written for the shipped player, limb by limb: its joints stand here by their names, not by
+`Model.roles`, as the numbers beside them fit no other body.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -29,7 +29,7 @@ def _dribble(model) -> tuple[Reference, np.ndarray, np.ndarray]:
     times = clip.reference.timestep * np.arange(clip.reference.frame_count)
     touch = np.zeros((len(times), 2), bool)
     touch[:, 1] = (times >= clip.contact[0]) | (times == 0.0)
-    place = model.q_slice("ball").start
+    place = model.q_slice(model.roles.one("ball_joint")).start
     return clip.reference, clip.reference.joint_q[:, place : place + 3], touch
 
 
@@ -45,7 +45,7 @@ def authored_clip(model, name: str) -> Authored:
     """An authored clip on the player. Raises KeyError for a name that is none."""
     reference, path, touch = AUTHORED[name](model)
     joint_q = reference.joint_q.copy()
-    place = model.q_slice("ball").start
+    place = model.q_slice(model.roles.one("ball_joint")).start
     joint_q[:, place : place + 3] = path
     reference = replace(reference, joint_q=joint_q)
     centre = find_hands(model, reference).centre

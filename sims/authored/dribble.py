@@ -97,7 +97,7 @@ def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
     snap = np.sin(np.pi * np.minimum(times % period / flight, 1.0) ** 0.7) ** 2
     tilt = np.interp(snap, [0.0, 1.0], style.fingers)
     _right_arm(model, joint_q, under, radius, np.radians(tilt), np.radians(style.roll))
-    ball = model.q_slice("ball")
+    ball = model.q_slice(model.roles.one("ball_joint"))
     joint_q[:, ball.start : ball.start + 2] = style.ball_place
     joint_q[:, ball.start + 2] = ball_height(times % period)
     joint_q[-1] = joint_q[0]

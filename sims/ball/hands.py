@@ -10,15 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from ..model import pose
 
-SIDES = ("l", "r")
-"""Hand 0 is the left one, hand 1 the right one."""
 SMOOTH = 0.02
 """[s]"""
 
 
 @dataclass(frozen=True)
 class Hands:
-    """Both hands over time, left then right."""
+    """Both hands over time: hand 0 is the left one, hand 1 the right one."""
 
     centre: np.ndarray
     """(frames, 2, 3) [m], where a ball's centre is that lies on the palm."""
@@ -35,18 +33,19 @@ class Hands:
 
 
 def find_hands(model, reference) -> Hands:
-    """The hands of a model in a reference; its palms are the sites `l_palm` and `r_palm`."""
-    body_q = pose.forward(model, reference.joint_q)
+    """The hands of a model in a reference. Raises ModelError for a model without palms, shoulders or a
+    ball."""
+    palms = [model.sites[palm] for palm in model.roles.both("palms")]
+    uppers = [model.joint_body(shoulder) for shoulder in model.roles.both("shoulders")]
+    body_q = pose.forward(model, reference.joint_q, [*uppers, *(body for body, _, _ in palms)])
     radius = model.ball_radius
-    centres, normals, shoulders = [], [], []
-    for side in SIDES:
-        body, place, turn = model.sites[f"{side}_palm"]
+    centres, normals = [], []
+    for body, place, turn in palms:
         hand = Rotation.from_quat(body_q[:, body, 3:])
         normals.append((hand * Rotation.from_quat(turn)).apply([0.0, 0.0, 1.0]))
         centres.append(body_q[:, body, :3] + hand.apply(place) + radius * normals[-1])
-        shoulders.append(body_q[:, model.body(f"{side}_upper_arm"), 2])
     centre = np.stack(centres, axis=1)
     smooth = gaussian_filter1d(centre, SMOOTH / reference.timestep, axis=0, mode="nearest")
     velocity = np.gradient(smooth, reference.timestep, axis=0) if len(smooth) > 1 else 0.0 * smooth
-    shoulder, normal = np.stack(shoulders, axis=1), np.stack(normals, axis=1)
-    return Hands(centre, velocity, normal, shoulder, radius, reference.timestep)
+    normal = np.stack(normals, axis=1)
+    return Hands(centre, velocity, normal, body_q[:, uppers, 2], radius, reference.timestep)

@@ -8,22 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps, pose
+from ..model import Model, gaps, pose
+from .mapping import Mapping
 from .planting import find_foot
 from .reach import joint_range
 from .retarget import Retargeted
 
 ON_GROUND = 0.005
 """[m] A point of the sole this low carries."""
-LIMBS = {
-    "trunk": ("torso", "head"),
-    "hips": ("upper_leg",),
-    "knees": ("lower_leg",),
-    "feet": ("foot",),
-    "shoulders": ("upper_arm",),
-    "elbows": ("lower_arm",),
-    "hands": ("hand",),
-}
+LIMBS = ("trunk", "hips", "knees", "feet", "shoulders", "elbows", "hands")
 
 
 @dataclass(frozen=True)
@@ -62,8 +55,8 @@ def accuracy(model, result: Retargeted) -> Accuracy:
         for body, goal in result.goals.items()
     }
     limbs = {}
-    for limb, ends in LIMBS.items():
-        part = [e for body, e in errors.items() if body.removeprefix("l_").removeprefix("r_") in ends]
+    for limb, bodies in _limbs(model, result.mapping).items():
+        part = [error for body, error in errors.items() if body in bodies]
         if part:
             limbs[limb] = (float(np.mean(part)), float(np.quantile(part, 0.95)))
     slides, strict, lows = [], [], []
@@ -84,7 +77,7 @@ def accuracy(model, result: Retargeted) -> Accuracy:
     slide = np.concatenate(slides) if slides else np.zeros(1)
     slide = slide if len(slide) else np.zeros(1)
     every = np.concatenate(strict) if strict else np.zeros(1)
-    root = model.descendants(0)
+    own = model.descendants(model.joint_body(model.root))
     return Accuracy(
         limbs=limbs,
         mean=float(np.mean(list(errors.values()))),
@@ -92,11 +85,21 @@ def accuracy(model, result: Retargeted) -> Accuracy:
         sliding_all=float(every.mean()) if len(every) else 0.0,
         sliding_worst=float(np.quantile(slide, 0.99)),
         penetration=deepest,
-        body_penetration=max(0.0, -float(gaps.lowest_point(model, body_q, root).min())),
+        body_penetration=max(0.0, -float(gaps.lowest_point(model, body_q, own).min())),
         off_ground=float(np.concatenate(lows).mean()) if lows else 0.0,
         standing=float(stood.mean()),
         limits=beyond_limits(model, joint_q),
     )
+
+
+def _limbs(model: Model, mapping: Mapping) -> dict[str, set[str | None]]:
+    """Limb -> the bodies whose origins are its joints."""
+    ends = [
+        [model.body_names[body] for body in bodies]
+        for hinges in (mapping.legs, mapping.arms)
+        for bodies in zip(*(pose.limb_bodies(model, hinge) for hinge in hinges))
+    ]
+    return {limb: set(bodies) for limb, bodies in zip(LIMBS, [[model.roles.trunk, model.roles.head], *ends])}
 
 
 def sole_points(foot, body_q: np.ndarray) -> np.ndarray:

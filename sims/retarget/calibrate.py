@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from ..model import Model, pose
 from ..recording.motion import Motion
-from .mapping import Mapping
+from .mapping import Mapping, MappingError
 
 STRAIGHT = np.radians(8.0)
 """A hinge that never bends more than this shows no axis."""
@@ -89,7 +89,7 @@ def rest_by_directions(model, motion: Motion, mapping: Mapping) -> Motion:
         motion, rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (len(motion.joint_names), 1))
     ).rest()
     hips = [motion.index(mapping.bodies[b]) for b in _hip_bodies(model, mapping)]
-    spine = next(j for j in reversed(_trunk(motion, mapping)) if at[j].any())
+    spine = next(j for j in reversed(_trunk(model, motion, mapping)) if at[j].any())
     local = Rotation.from_quat(frames[0]).inv()
     left = local.apply(at[hips[0]] - at[hips[1]])
     up = local.apply(at[spine] - 0.5 * (at[hips[0]] + at[hips[1]]))
@@ -133,15 +133,18 @@ def _directions(model, zero, motion: Motion, mapping: Mapping) -> dict[int, tupl
             if joint is not None and motion.parents[shoulder] == motion.index(joint):
                 line = zero[bodies[0]] - zero[clavicle]
                 wanted[motion.index(joint)] = (motion.offsets[shoulder], line)
-    for joint in _trunk(motion, mapping):
+    for joint in _trunk(model, motion, mapping):
         if motion.parents[joint] > 0:
             wanted[int(motion.parents[joint])] = (motion.offsets[joint], np.array([0.0, 0.0, 1.0]))
     return {joint: (bone, line) for joint, (bone, line) in wanted.items() if bone.any()}
 
 
-def _trunk(motion: Motion, mapping: Mapping) -> list[int]:
+def _trunk(model: Model, motion: Motion, mapping: Mapping) -> list[int]:
     """The joints from the head down to the first behind the root."""
-    chain = [motion.index(mapping.bodies["head"])]
+    head = model.roles.one("head")
+    if head not in mapping.bodies:
+        raise MappingError(f"{mapping.name}: bodies.{head}: missing; a T-pose by directions needs it")
+    chain = [motion.index(mapping.bodies[head])]
     while motion.parents[chain[-1]] > 0:
         chain.append(int(motion.parents[chain[-1]]))
     return chain

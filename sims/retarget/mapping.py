@@ -73,7 +73,7 @@ class Mapping:
         return names >= set(self.joints())
 
     def check_model(self, model) -> None:
-        """Raise MappingError for a body or hinge that the model does not have."""
+        """Raise MappingError for a body or hinge that the model does not have, or a hand without knuckles."""
         for table, there in (
             ("bodies", model.body_names),
             ("points", model.body_names),
@@ -89,6 +89,10 @@ class Mapping:
                         f"{self.name}: {table}.{key}: the model has no {what} '{key}'; "
                         f"it has {', '.join(there)}"
                     )
+        for hand in self.palms:
+            if (hand, 3) not in [(h, len(k)) for h, k in zip(model.roles.hands, model.roles.knuckles)]:
+                reason = f"{model.path} does not say which bodies are its knuckles, or that it is a hand"
+                raise MappingError(f"{self.name}: palms.{hand}: {reason}")
 
 
 def read_mapping(name: str | Path) -> Mapping:

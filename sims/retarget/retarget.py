@@ -173,9 +173,8 @@ def _body_rotations(
 
 def _palm(model, hand: str, places) -> Rotation:
     """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]."""
-    zero = model.zero_pose[:, :3]
-    side = hand.removesuffix("hand")
-    own = [zero[model.body(hand)]] + [zero[model.body(f"{side}{f}_1")] for f in ("index", "middle", "pinky")]
+    knuckles = model.roles.knuckles[model.roles.hands.index(hand)]
+    own = [model.zero_pose[model.body(name), :3] for name in (hand, *knuckles)]
     wrist, index, middle, little = places
     now = pose.frame_of(middle - wrist, index - little)
     return now * pose.frame_of(own[2] - own[0], own[1] - own[3]).inv()
