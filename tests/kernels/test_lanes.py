@@ -61,28 +61,18 @@ def test_unused_lanes_change_nothing(model):
     assert all(np.array_equal(a, b[:5]) for a, b in zip(few, full))
 
 
-def test_one_launch_is_many_steps(model):
-    at_once = run(model, steps=20)
-    sim = Simulation(model, WORLDS)
-    assert at_once[0].shape == sim.joint_q.shape
-    for lanes in (4, 16):
-        parts = run_in_parts(model, lanes)
-        whole = run(model, steps=20, lanes=lanes)
-        assert all(np.array_equal(a, b) for a, b in zip(parts, whole))
+@pytest.mark.parametrize("lanes", [4, 16])
+def test_one_launch_is_many_steps(model, monkeypatch, lanes):
+    whole, step, calls = run(model, steps=20, lanes=lanes), Simulation.step, []
 
-
-def run_in_parts(model, lanes):
-    q, qd = [], []
-    original = Simulation.step
-
-    def by_one(self, count=1):
+    def by_one(sim, count=1):
         for _ in range(count):
-            original(self)
+            calls.append(step(sim))
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Simulation, "step", by_one)
-        q, qd = run(model, steps=20, lanes=lanes)
-    return q, qd
+    monkeypatch.setattr(Simulation, "step", by_one)
+    parts = run(model, steps=20, lanes=lanes)
+    assert len(calls) == 20
+    assert all(np.array_equal(a, b) for a, b in zip(parts, whole))
 
 
 @pytest.mark.parametrize("lanes", [0, 2, 3, 32, "16"])

@@ -346,6 +346,15 @@ def quaternion_starts(m):
     return sorted([*free, *ball])
 
 
+def same_signs(m, q, other):
+    """qpos (n, nq) with each quaternion's sign that of another's: the same rotations."""
+    q = np.array(q, float)
+    for k in quaternion_starts(m):
+        turned = np.sum(q[:, k : k + 4] * other[:, k : k + 4], axis=1) < 0
+        q[turned, k : k + 4] *= -1
+    return q
+
+
 def to_mujoco(m, q):
     """joint_q (xyzw) as qpos (wxyz), float64, its quaternions normalised."""
     q = np.array(q, float)

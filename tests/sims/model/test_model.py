@@ -94,8 +94,8 @@ def test_refused_by_name(case):
     assert "\n" not in str(error.value)  # one line, as the command line prints it
 
 
-# What is read past without a word today, though it changes the motion in MuJoCo.
-SILENT = {
+# What changes the motion in MuJoCo and not here.
+NOT_SIMULATED = {
     "gravcomp": mjcf('<body gravcomp="1"><joint/><geom size="0.1"/></body>'),
     "one-sided effort range": actuator('<position joint="j" kp="1" forcerange="0 5"/>'),
     "two servos on one joint": actuator('<position joint="j" kp="1"/><position joint="j" kp="2"/>'),
@@ -105,11 +105,11 @@ SILENT = {
 }
 
 
-@pytest.mark.parametrize("case", SILENT)
+@pytest.mark.parametrize("case", NOT_SIMULATED)
 def test_not_left_out_silently(case):
     """The reader promises to refuse by name, or to note, what it does not simulate."""
     try:
-        model = scenes.model(SILENT[case])
+        model = scenes.model(NOT_SIMULATED[case])
     except (ModelError, UserWarning):
         return
     assert model.notes, f"{case} is dropped without a word"

@@ -74,6 +74,7 @@ def test_every_table_has_its_length(full, stiff):
     """Rows of links, dofs, bodies, shapes and slots as many as there are, and none that points elsewhere."""
     t, links = stiff.tables, len(stiff.joint_names) + 1
     count = {"link": links, "dof": stiff.nv, "body": stiff.nbody, "shape": len(stiff.shapes)}
+    assert set(count) <= {name.split("_")[0] for name in t}
     for name, rows in t.items():
         what = name.split("_")[0]
         if what in count:

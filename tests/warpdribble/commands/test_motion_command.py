@@ -1,5 +1,6 @@
 import json
 
+import numpy as np
 import pytest
 
 from warpdribble.cli import main
@@ -8,9 +9,15 @@ from warpdribble.cli import main
 def test_a_table(capsys, cmu_clip):
     assert main(["motion", "info", str(cmu_clip)]) == 0
     said = capsys.readouterr().out
-    for word in ("121", "120 Hz", "root", "right hand", "left foot", "jumps", "frozen", "under", "none"):
-        assert word in said or word == "121"
-    assert "frames 0 to 120" in said and "lost bone lengths" in said
+    for line in (
+        ", frames 0 to 120, 1.00 s at 120 Hz",
+        "left hand   0.83 to 0.83 m, 0 strokes",
+        "right hand  0.83 to 1.10 m, 1 strokes: lowest at 60",
+        "left foot   1 stances, slides 0.0 cm/s: 0-120",
+        *(f"{what:10}  none" for what in ("jumps", "frozen", "under")),
+    ):
+        assert f"{line}\n" in said
+    assert "root        0.00 m/s" in said and "lost bone lengths" in said
 
 
 def test_json_has_everything_and_counts_from_the_clip_s_first_frame(capsys, mocap):
@@ -18,8 +25,11 @@ def test_json_has_everything_and_counts_from_the_clip_s_first_frame(capsys, moca
     assert main(["motion", "info", str(clip), "--frames", "400", "1040", "--format", "json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["frames"] == 641 and report["ball_bounces"] is None
-    assert all(400 <= f <= 1040 for f in report["hands"]["right"]["strokes"])
-    assert all(400 <= first <= last <= 1040 for first, last in report["feet"]["left"]["contacts"])
+    strokes = np.array(report["hands"]["right"]["strokes"])
+    assert len(strokes) == 6 and strokes.min() >= 400 and strokes.max() <= 1040
+    stances = np.array(report["feet"]["left"]["contacts"])
+    assert len(stances) == 4 and np.all(np.diff(stances.ravel()) > 0)
+    assert stances.min() == 400 and stances.max() == 1040
     assert {"what", "first", "last", "size"} <= set(report["jumps"][0])
 
 

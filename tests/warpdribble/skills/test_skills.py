@@ -122,7 +122,8 @@ def test_the_commands(capsys, tmp_path, cmu_clip):
     assert main(["skill", "show", str(tmp_path / "none.toml")]) == 2
     assert "no such file" in capsys.readouterr().err
     assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.toml")]) == 0
-    assert read_skill(tmp_path / "d.toml").frames[0] >= 0
+    drafted = read_skill(tmp_path / "d.toml")
+    assert (drafted.name, drafted.frames, drafted.cyclic) == ("clip", (0, 120), True)
     assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.txt")]) == 2
     assert "a skill is a .toml file" in capsys.readouterr().err
 
@@ -132,4 +133,5 @@ def test_motion_commands(capsys, cmu_clip):
     out = capsys.readouterr().out
     assert "hands" in out and "mapping cmu" in out
     assert main(["motion", "cycles", str(cmu_clip), "--longest", "1.0"]) == 0
+    assert [row.split()[0] for row in capsys.readouterr().out.splitlines()] == ["frames", "0-120"]
     assert main(["motion", "cycles", str(cmu_clip), "--shortest", "3"]) == 2
