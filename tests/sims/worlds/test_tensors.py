@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+import torch
 
 from warpdribble.sims import Model, Simulation
-
-torch = pytest.importorskip("torch", reason="torch is an optional extra: learn")
 
 
 @pytest.mark.parametrize("lanes", [1, 16])
