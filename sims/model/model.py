@@ -122,13 +122,17 @@ class Model:
         """Index of the body that a joint moves against its parent."""
         return int(self.joint_child[self.joint(name)])
 
+    def body_joints(self, body: int) -> list[Joint]:
+        """The joints that move a body against its parent, from there outward; none when it is welded."""
+        return [joint for joint in self.joints if joint.body == body]
+
     def body_joint(self, body: int) -> str:
         """The one joint that moves a body against its parent. Raises ValueError when there are none or
         several."""
-        joints = np.flatnonzero(self.joint_child == body)
+        joints = self.body_joints(body)
         if len(joints) != 1:
             raise ValueError(f"body '{self.body_names[body]}' has {len(joints)} joints, not one")
-        return self.joint_names[joints[0]]
+        return joints[0].name
 
     def q_slice(self, name: str) -> slice:
         """Where a joint's coordinates are in joint_q."""

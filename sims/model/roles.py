@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .joints import Joint
 from .mjcf import ModelError
 
 if TYPE_CHECKING:
@@ -98,11 +99,11 @@ class Roles:
 
 def find_roles(model: Model) -> Roles:
     """The roles of a model, from its texts and its tree. Raises ModelError for a text that names no body."""
-    root = next((n for n in model.joint_names[:1] if model.joint_type(n) == "free"), None)
+    root = _first([joint.name for joint in model.joints[:1] if joint.kind == "free"])
     ball = _first(model.listed("ball"))
     head = _first(model.listed("head"))
     hands, feet = (_carrying(model, model.listed(text)) for text in ("hands", "feet"))
-    free = [n for n in _joints(model, ball) if model.joint_type(n) == "free"]
+    free = [joint.name for joint in _joints(model, ball) if joint.kind == "free"]
     return Roles(
         file=str(model.path),
         root=root,
@@ -131,9 +132,9 @@ def _parent(model: Model, body: str) -> str | None:
     return None if parent < 0 else model.body_names[parent]
 
 
-def _joints(model: Model, body: str | None) -> list[str]:
+def _joints(model: Model, body: str | None) -> list[Joint]:
     """The joints that move a body against its parent."""
-    return [] if body is None else [n for n in model.joint_names if model.joint_body(n) == model.body(body)]
+    return [] if body is None else model.body_joints(model.body(body))
 
 
 def _carrying(model: Model, names: list[str]) -> tuple[str, ...]:
@@ -145,7 +146,7 @@ def _spine(model: Model, body: str | None) -> tuple[str, ...]:
     """Joints from a body down to its root, in the order from there up."""
     found: list[str] = []
     while body is not None:
-        found = [n for n in _joints(model, body) if model.joint_type(n) != "free"] + found
+        found = [joint.name for joint in _joints(model, body) if joint.kind != "free"] + found
         body = _parent(model, body)
     return tuple(found)
 
@@ -155,7 +156,7 @@ def _limbs(model: Model, ends: tuple[str, ...], roles: tuple[str, str, str]) -> 
     hinge: half a pair would pass for the other half."""
     found = []
     for end in ends:
-        chain: list[str] = []
+        chain: list[Joint] = []
         body: str | None = end
         for _ in roles:
             joints = _joints(model, body)
@@ -163,18 +164,18 @@ def _limbs(model: Model, ends: tuple[str, ...], roles: tuple[str, str, str]) -> 
                 return {}
             chain.insert(0, joints[0])
             body = _parent(model, body)
-        if model.joint_type(chain[1]) != "hinge":
+        if chain[1].kind != "hinge":
             return {}
         found.append(chain)
-    return {role: tuple(chain[i] for chain in found) for i, role in enumerate(roles)}
+    return {role: tuple(chain[i].name for chain in found) for i, role in enumerate(roles)}
 
 
 def _toes(model: Model, feet: tuple[str, ...], listed: list[str]) -> tuple[str, ...]:
     """The hinge behind each foot that moves a body which is listed with it; empty unless each has one."""
     found = []
     for foot in feet:
-        behind = [n for name in listed if _parent(model, name) == foot for n in _joints(model, name)]
-        found += [n for n in behind if model.joint_type(n) == "hinge"][:1]
+        behind = [joint for name in listed if _parent(model, name) == foot for joint in _joints(model, name)]
+        found += [joint.name for joint in behind if joint.kind == "hinge"][:1]
     return tuple(found) if len(found) == len(feet) else ()
 
 

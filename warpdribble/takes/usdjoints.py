@@ -13,19 +13,19 @@ spherical
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 
-from ..sims.model import Model
+from ..sims.model import Joint, Model
 from .names import prim_names
 
 KINDS = ("revolute", "d6", "spherical")
 PER_DEGREE = np.pi / 180.0
 """[rad] in a degree: a gain per radian times this is the gain per degree."""
-FREE, BALL = 0, 1
 AXES = "XYZ"
 Ends = tuple[str | None, str]
 """Paths of the bodies that a joint ties: the parent's, None for the world, and the child's."""
@@ -63,9 +63,9 @@ def add(
     for body, name in enumerate(model.body_names):
         if is_static(model, body):
             continue
-        links = links_of(model, body)
+        joints = model.body_joints(body)
         parent = int(model.body_parent[body])
-        if len(links) == 1 and model.tables["link_joint"][links[0]] == FREE:
+        if [joint.kind for joint in joints] == ["free"]:
             if body in model.body_parent:
                 UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(paths[name]))
             continue
@@ -74,33 +74,17 @@ def add(
         UsdGeom.Scope.Define(stage, where)
         ends = (paths[model.body_names[parent]] if parent >= 0 else None, paths[name])
         turn = _pose(body_q, parent).R.inv() * _pose(body_q, body).R
-        if not links:
+        if not joints:
             frame = _in_link(model, parent).inverse() @ _in_link(model, body)
             _joint(stage, UsdPhysics.FixedJoint, f"{where}/{legal[name + ' weld']}", ends, frame, WORLD)
-        for link, frame0, frame1 in _frames(model, parent, body, links):
-            path = f"{where}/{legal[model.joint_names[link - 1]]}"
-            _add_joint(stage, path, model, link, ends, frame0, frame1, turn, kind)
-
-
-def links_of(model: Model, body: int) -> list[int]:
-    """The links (rows of the model's tables) of a body's joints, from its parent outwards; none when it is
-    welded."""
-    parent = int(model.body_parent[body])
-    top = int(model.tables["body_link"][parent]) if parent >= 0 else 0
-    links, link = [], int(model.tables["body_link"][body])
-    while link != top:
-        links.append(link)
-        link = int(model.tables["link_parent"][link])
-    return links[::-1]
+        for joint, frame0, frame1 in _frames(model, parent, body, joints):
+            path = f"{where}/{legal[joint.name]}"
+            _add_joint(stage, path, model, joint, ends, frame0, frame1, turn, kind)
 
 
 def is_static(model: Model, body: int) -> bool:
     """Whether a body is welded to the world."""
-    while body >= 0:
-        if links_of(model, body):
-            return False
-        body = int(model.body_parent[body])
-    return True
+    return bool(model.body_link[body] == 0)
 
 
 def _pose(body_q: np.ndarray, body: int) -> Frame:
@@ -111,45 +95,39 @@ def _in_link(model: Model, body: int) -> Frame:
     """A body's frame in that of its last link."""
     if body < 0:
         return WORLD
-    t = model.tables
-    return Frame(t["body_offset"][body], Rotation.from_quat(t["body_turn"][body]))
+    return Frame(model.body_offset[body], Rotation.from_quat(model.body_turn[body]))
 
 
-def _frames(model: Model, parent: int, body: int, links: list[int]) -> list[tuple[int, Frame, Frame]]:
-    """(link, its frame in the parent body, its frame in the body), all joints at zero."""
-    t = model.tables
+def _frames(
+    model: Model, parent: int, body: int, joints: Sequence[Joint]
+) -> list[tuple[Joint, Frame, Frame]]:
+    """(joint, its frame in the parent body, its frame in the body), all joints at zero."""
     frame, frames = _in_link(model, parent).inverse(), []
-    for link in links:
-        frame = frame @ Frame(t["link_offset"][link], Rotation.from_quat(t["link_turn"][link]))
+    for joint in joints:
+        frame = frame @ Frame(joint.offset, Rotation.from_quat(joint.turn))
         frames.append(frame)
     child = frames[-1] @ _in_link(model, body) if frames else frame
-    return [(link, f, child.inverse() @ f) for link, f in zip(links, frames)]
+    return [(joint, f, child.inverse() @ f) for joint, f in zip(joints, frames)]
 
 
 def _add_joint(
     stage: Usd.Stage,
     path: str,
     model: Model,
-    link: int,
+    joint: Joint,
     ends: Ends,
     frame0: Frame,
     frame1: Frame,
     turn: Rotation,
     kind: str,
 ) -> None:
-    t = model.tables
-    dof = int(t["link_dof"][link])
-    gains: Gains | None = None
-    if t["link_driven"][link]:
-        gains = float(t["dof_kp"][dof]), float(t["dof_kd"][dof]), float(t["link_effort"][link])
-    limits = (float(t["link_lower"][link]), float(t["link_upper"][link])) if t["link_limited"][link] else None
-    armature = float(t["dof_armature"][dof])
+    gains = (joint.kp, joint.kd, joint.effort) if joint.driven else None
+    limits, armature = joint.limits, joint.armature
     at_start = frame0.R.inv() * turn * frame1.R
-    if t["link_joint"][link] != BALL:
-        axis = Rotation.align_vectors([t["link_axis"][link]], [[1.0, 0.0, 0.0]])[0]
-        zero = float(t["link_zero"][link])
+    if joint.kind != "ball":
+        axis = Rotation.align_vectors([joint.axis], [[1.0, 0.0, 0.0]])[0]
         angle = float((axis.inv() * at_start * axis).as_rotvec()[0])
-        limits = limits and (limits[0] - zero, limits[1] - zero)
+        limits = limits and (limits[0] - joint.zero, limits[1] - joint.zero)
         _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle)
         _extend(stage.GetPrimAtPath(path), armature, angle)
         return
@@ -166,11 +144,11 @@ def _add_joint(
         _d6(stage, path, ends, frame0, frame1, reach, gains, euler)
         _extend(stage.GetPrimAtPath(path), armature)
     else:
-        joint = _joint(stage, UsdPhysics.SphericalJoint, path, ends, frame0, frame1)
-        joint.CreateAxisAttr(_bone_axis(model, link))
+        spherical = _joint(stage, UsdPhysics.SphericalJoint, path, ends, frame0, frame1)
+        spherical.CreateAxisAttr(_bone_axis(model, joint))
         if reach is not None:
-            joint.CreateConeAngle0LimitAttr(min(np.degrees(reach), 179.0))
-            joint.CreateConeAngle1LimitAttr(min(np.degrees(reach), 179.0))
+            spherical.CreateConeAngle0LimitAttr(min(np.degrees(reach), 179.0))
+            spherical.CreateConeAngle1LimitAttr(min(np.degrees(reach), 179.0))
 
 
 def _joint(
@@ -256,11 +234,10 @@ def _extend(prim: Usd.Prim, armature: float, angle: float | None = None) -> None
         prim.CreateAttribute(name, kind, custom=False).Set(value)
 
 
-def _bone_axis(model: Model, link: int) -> str:
-    """The axis of a link's frame that its bone runs along: towards the links it carries, or its own mass."""
-    t = model.tables
-    carried = [t["link_offset"][i] for i in range(1, len(t["link_parent"])) if t["link_parent"][i] == link]
-    along = np.sum(carried, axis=0) if carried else t["link_com"][link]
+def _bone_axis(model: Model, joint: Joint) -> str:
+    """The axis of a joint's frame that its bone runs along: towards the joints it carries, else its mass."""
+    carried = [other.offset for other in model.joints if other.parent == joint.link]
+    along = np.sum(carried, axis=0) if carried else joint.com
     return AXES[int(np.argmax(np.abs(along)))]
 
 

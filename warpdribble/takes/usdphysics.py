@@ -35,7 +35,7 @@ def add(
 def add_world(stage: Usd.Stage, model: Model, shapes: list[Shape]) -> None:
     """Gravity, and the colliders of the world's own shapes below `/World/Court`."""
     scene = UsdPhysics.Scene.Define(stage, "/World/PhysicsScene")
-    gravity = np.asarray(model.tables["gravity"], float)
+    gravity = np.asarray(model.gravity, float)
     size = float(np.linalg.norm(gravity))
     scene.CreateGravityDirectionAttr(Gf.Vec3f(*(gravity / size if size else [0.0, 0.0, -1.0])))
     scene.CreateGravityMagnitudeAttr(size)
