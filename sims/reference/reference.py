@@ -70,18 +70,17 @@ class Cycle:
         pieces.append(self._moved(start, free, count))
         return replace(self.reference, joint_q=np.concatenate(pieces))
 
+    def ahead(self, model: Model, poses: np.ndarray) -> np.ndarray:
+        """Where poses (n, 7) [m, -] or points (n, 3) [m] of a cycle are in the next one."""
+        anchor = self.reference.joint_q[0, model.q_slice(model.root)][:2]
+        return over_ground(poses, anchor, anchor + np.asarray(self.travel), self.turn)
+
     def _carried(self, model) -> list[slice]:
         """Where what is loose and goes along, as a dribbled ball, is in joint_q."""
         loose = [joint.q for joint in model.joints[1:] if joint.kind == "free"]
-        root, last = model.q_slice(model.root), self.reference.joint_q[-1]
-        anchor = self.reference.joint_q[0, root][:2]
-        along = []
-        for part in loose:
-            first = self.reference.joint_q[:1, part]
-            goal = over_ground(first, anchor, anchor + np.asarray(self.travel), self.turn)[0]
-            if np.linalg.norm(goal[:3] - last[part][:3]) < ALONG:
-                along.append(part)
-        return along
+        first, last = self.reference.joint_q[:1], self.reference.joint_q[-1]
+        goals = [self.ahead(model, first[:, part])[0] for part in loose]
+        return [part for part, goal in zip(loose, goals) if np.linalg.norm(goal[:3] - last[part][:3]) < ALONG]
 
     def _moved(self, joint_q, free: list[slice], number: int) -> np.ndarray:
         """Rows joint_q (n, nq) in the cycle of that number: the root and all that is loose, as the ball, are
@@ -120,13 +119,19 @@ def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35)
     lines = model.dof_slice(model.root).start
     ahead = rotation(turn) @ _speed(model, reference, slice(0, 4))[lines : lines + 2]
     faster[lines : lines + 2] += ahead - _speed(model, reference, slice(0, 4))[lines : lines + 2]
-    span = min(BLEND, 0.5 * reference.duration)
-    before = reference.duration - reference.timestep * np.arange(reference.frame_count)
-    share = np.clip(1.0 - before / span, 0.0, 1.0)[:, None]
+    share, span = closing(reference)
     bend = smoothstep(share) * missing + share**2 * (share - 1.0) * span * faster
     closed = integrate(model, reference.joint_q, bend)
     size = np.sqrt(np.mean(missing[0, _joint_dofs(model)] ** 2))
     return Cycle(replace(reference, joint_q=closed), turn, tuple(travel.tolist()), float(size))
+
+
+def closing(reference: Reference) -> tuple[np.ndarray, float]:
+    """How far (frames, 1) the end of a clip has come, from 0 to 1, in being bent back to its beginning; and
+    how long [s] that takes."""
+    span = min(BLEND, 0.5 * reference.duration)
+    before = reference.duration - reference.timestep * np.arange(reference.frame_count)
+    return np.clip(1.0 - before / span, 0.0, 1.0)[:, None], span
 
 
 def _speed(model, reference: Reference, rows: slice) -> np.ndarray:

@@ -13,10 +13,11 @@ from ..sims.ball.ball import Ball, ball_path, find_checkpoints, flights_of, infe
 from ..sims.ball.hands import find_hands
 from ..sims.model import Model
 from ..sims.reference.mirror import mirrored, mirrored_ball
-from ..sims.reference.reference import BLEND, Cycle, Reference, close_cycle
+from ..sims.reference.reference import Cycle, Reference, close_cycle, closing
 from ..sims.retarget.mapping import MappingError, find_mapping, read_mapping
 from ..sims.retarget.reach import lift_out
 from ..sims.retarget.retarget import retargeted
+from ..sims.signals import smoothstep
 from .skill import HANDS, Skill, SkillError
 
 
@@ -150,13 +151,8 @@ def _closed_ball(model: Model, ball: Ball, cycle: Cycle) -> Ball:
     reference = cycle.reference
     if not ball.recorded:
         return replace(ball, path=ball_path(find_hands(model, reference), ball.touch, ball.flights))
-    anchor = reference.joint_q[0, :2]
-    goal = ball.path[0].copy()
-    turn = np.array([[np.cos(cycle.turn), -np.sin(cycle.turn)], [np.sin(cycle.turn), np.cos(cycle.turn)]])
-    goal[:2] = turn @ (goal[:2] - anchor) + anchor + cycle.travel
-    before = reference.duration - reference.timestep * np.arange(reference.frame_count)
-    share = np.clip(1.0 - before / min(BLEND, 0.5 * reference.duration), 0.0, 1.0)[:, None]
-    path = ball.path + share**2 * (3.0 - 2.0 * share) * (goal - ball.path[-1])
+    share, _ = closing(reference)
+    path = ball.path + smoothstep(share) * (cycle.ahead(model, ball.path[:1]) - ball.path[-1])
     path[:, 2] = np.maximum(path[:, 2], ball.path[:, 2].min())
     return replace(ball, path=path)
 

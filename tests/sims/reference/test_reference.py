@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -32,6 +33,40 @@ def test_integrate_undoes_difference(player):
     motion = random_motion(player, seed=1)
     end = integrate(player, start, motion)
     assert np.allclose(difference(player, start, end), motion, atol=1e-9)
+
+
+def wxyz(model, joint_q):
+    """As MuJoCo has it."""
+    qpos = joint_q.copy()
+    for k in model.quaternions():
+        qpos[..., k : k + 4] = np.roll(joint_q[..., k : k + 4], 1, axis=-1)
+    return qpos
+
+
+def test_differences_and_integrals_are_mujoco_s(player):
+    """Rotations of a child in its own axes, as mj_differentiatePos and mj_integratePos have them."""
+    m = mujoco.MjModel.from_xml_path(str(player.path))
+    start = integrate(player, np.tile(player.start_q, (6, 1)), random_motion(player, 6))
+    end = integrate(player, start, random_motion(player, 6, seed=2))
+    motion = difference(player, start, end)
+    for a, b, v in zip(wxyz(player, start), wxyz(player, end), motion):
+        theirs, reached = np.empty(m.nv), a.copy()
+        mujoco.mj_differentiatePos(m, theirs, 1.0, a, b)
+        np.testing.assert_allclose(v, theirs, atol=1e-12)
+        mujoco.mj_integratePos(m, reached, v, 1.0)
+        for k in player.quaternions():  # which say the same with either sign
+            reached[k : k + 4] *= np.sign(reached[k : k + 4] @ b[k : k + 4])
+        np.testing.assert_allclose(reached, b, atol=1e-12)
+
+
+def test_any_number_of_axes(player):
+    start = integrate(player, np.tile(player.start_q, (2, 3, 1)), np.zeros((2, 3, player.nv)))
+    motion = random_motion(player, 6).reshape(2, 3, -1)
+    end = integrate(player, start, motion)
+    np.testing.assert_array_equal(end[1, 2], integrate(player, start[1, 2], motion[1, 2]))
+    np.testing.assert_array_equal(
+        difference(player, start, end)[1, 2], difference(player, start[1, 2], end[1, 2])
+    )
 
 
 def test_velocity_times_the_step_leads_to_the_next_row(player):
@@ -72,6 +107,16 @@ def test_repeated_cycles_join_without_a_jump(player, count):
     assert (
         length.max() < 1.001 * np.linalg.norm(np.diff(cycle.reference.joint_q[:, :2], axis=0), axis=1).max()
     )
+
+
+def test_what_goes_along_is_ahead_in_the_next_cycle(player):
+    """The root in a row of the next cycle is that of this one, ahead; points go along with it."""
+    cycle = close_cycle(player, walk(player))
+    twice, count = cycle.repeat(player, 2).joint_q[:, player.q_slice("root")], cycle.reference.frame_count
+    own = cycle.reference.joint_q[:-1, player.q_slice("root")]
+    ahead = cycle.ahead(player, own)
+    np.testing.assert_allclose(ahead, twice[count - 1 : -1], atol=1e-12)
+    np.testing.assert_array_equal(cycle.ahead(player, own[:, :3]), ahead[:, :3])
 
 
 def test_a_cycle_cannot_be_repeated_less_than_once(player):
