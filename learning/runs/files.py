@@ -76,7 +76,7 @@ def held(folder: Path) -> Iterator[None]:
     """Hold a folder, so that no other process writes to it. Raises InputError that names who holds it."""
     path = folder / LOCK
     with open(path, "a+", encoding="utf-8") as file:
-        if not _lock(file):
+        if not _lock(file) or not _there(path, file):
             file.seek(0)
             holder = " ".join(file.read().split()) or "another process"
             raise InputError(f"is being written by {holder}: wait until it is done", folder, "out")
@@ -90,6 +90,13 @@ def held(folder: Path) -> Iterator[None]:
         finally:
             with contextlib.suppress(OSError):
                 path.unlink()
+
+
+def _there(path: Path, file: IO[str]) -> bool:
+    """Whether an open file is still the one of that name: who held it last may just have removed it."""
+    with contextlib.suppress(FileNotFoundError):
+        return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
+    return False
 
 
 def _lock(file: IO[str]) -> bool:
