@@ -34,6 +34,8 @@ RECORD_EVERY = 5
 """Fragments between recorded states."""
 SETTLED = 20
 """Fragments after which the states of a walk are typical of the policy."""
+TRIED = 2
+"""Policies that a check tries: the mean and the present one."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,7 @@ def _island(
     moments = Moments.of(S.reshape(len(each), -1), A.reshape(len(each), -1), each, W.ravel(), fragments)
     rows, lost = np.arange(len(k)), parents[:, 0] < 0
     age = rows - np.maximum.accumulate(np.where(lost, rows, -1))
-    lives = np.array([not lost[row : row + config.lag].any() for row in rows]) & (
+    lives = np.array([not lost[row + 1 :][: config.lag].any() for row in rows]) & (
         rows < len(rows) - config.lag
     )
     typical = [s for row, s in states if age[row] >= SETTLED and lives[row]]
@@ -279,7 +281,7 @@ class Progress(Report):
 
 class Samcon:
     """Learns a policy; everything that its future depends on is in `state`. tasks: where the islands walk,
-    shared out evenly, and where policies are tried, one for each worker."""
+    shared out evenly, one for each worker, and where policies are tried at once."""
 
     def __init__(
         self,
@@ -292,6 +294,8 @@ class Samcon:
             raise ValueError(
                 f"the tasks need {config.islands * config.particles} worlds, a world per particle"
             )
+        if len(trial_tasks) < min(len(tasks), TRIED):
+            raise ValueError(f"{len(tasks)} workers need {TRIED} tasks for trials, which run at once")
         self.tasks, self.trial_tasks, self.config, self.seed = list(tasks), list(trial_tasks), config, seed
         self.workers = Workers(len(self.tasks))
         graph = self.tasks[0].graph
@@ -434,7 +438,7 @@ def make(context: Context) -> Samcon:
         return Locomotion(model, context.graph, worlds, context.device, threads, c.weights)
 
     tasks = [task(c.particles * islands) for islands in shares(c.islands, count)]
-    return Samcon(tasks, [task(c.trials) for _ in range(min(count, 2))], c, context.seed)
+    return Samcon(tasks, [task(c.trials) for _ in range(min(count, TRIED))], c, context.seed)
 
 
 def locomotion_task(context: Context, worlds: int) -> Locomotion:
