@@ -7,6 +7,7 @@ first axis: neither the place nor the heading of a character in the world counts
 
 import warp as wp
 
+from .bounce import BOUNCE_SPEED
 from .kinematics import kinematics, load3, load4, own_inertia
 from .port import choose, give, take
 from .spatial import *
@@ -55,7 +56,7 @@ class Probe:
     column: wp.array(dtype=int)
     """the first of each term"""
     link: wp.array2d(dtype=int)
-    """of the two places, `(terms, 2)`"""
+    """of the two places, `(terms, 2)`; miss: the first and the end of what it judges in `judged`"""
     point: wp.array2d(dtype=wp.vec3)
     """on their links [m]"""
     value: wp.array2d(dtype=float)
@@ -157,9 +158,9 @@ def ballistic(
     probe: Probe, gravity: float, R: Mat3, from_root: Vec3, v: Vec3, z: Real, k: int,
     out: wp.array2d(dtype=float), g: int, c: int,
 ):  # fmt: skip
-    """Of a ball in free flight from height z [m]: time to the ground [s], where that is (2, facing frame)
-    [m], time to the meeting height on its way up, or to the highest point where it does not come so far
-    [s]."""
+    """Of a ball in free flight from height z [m] at v [m/s]: time to the ground [s], where that is (2, facing
+    frame) [m], time to the meeting height on its way up, or to the highest point where it does not come so
+    far [s]."""
     radius = probe.value[k, 0]
     up = max(z - radius, fill(0.0))
     zero = fill(0.0)
@@ -169,7 +170,7 @@ def ballistic(
     meet = fill(probe.value[k, 1] - radius)
     now = v.z * v.z - (2.0 * gravity) * (meet - up)
     soon = (1.0 / gravity) * (v.z - sqrt(max(now, zero)))
-    speed = probe.value[k, 2] * impact
+    speed = where_lt(fill(BOUNCE_SPEED), impact, probe.value[k, 2] * impact, zero)
     then = speed * speed - (2.0 * gravity) * meet
     late = lands + (1.0 / gravity) * (speed - sqrt(max(then, zero)))
     before = where_lt(zero, v.z, where_lt(now, zero, late, where_lt(soon, zero, late, soon)), late)
@@ -240,17 +241,19 @@ def observe(
         elif kind == BALLISTIC:
             x = spot(world, g, a, p)
             v = spot_velocity(world, g, a, p)
+            v = Vec3(v.x, v.y, v.z + 0.5 * tree.h * tree.gravity[2])  # the parabola's own, see `bounce`
             ballistic(probe, -tree.gravity[2], R, x - at, v, x.z, k, out, g, c)
         elif kind == STATUS:
             give(out, g, c, flags(world, g))
         else:
             angle = fill(0.0)
             rate = fill(0.0)
-            for j in range(probe.judged.shape[0]):
+            end = probe.link[k, 1]
+            for j in range(a, end):
                 off = miss(tree, world, probe, row, g, probe.judged[j])
                 angle = angle + off.angle
                 rate = rate + off.rate
-            share = 1.0 / wp.max(float(probe.judged.shape[0]), 1.0)
+            share = 1.0 / wp.max(float(end - a), 1.0)
             give(out, g, c, share * angle)
             give(out, g, c + 1, share * rate)
     total = fill(0.0)

@@ -72,6 +72,9 @@ class Probe:
         last = [find_place(model, t.places[-1]) if t.places else None for t in terms.values()]
         nowhere = Place(model.body_names[0], (0.0, 0.0, 0.0))
         a, b = (on_links(model, [p or nowhere for p in ends]) for ends in (first, last))
+        links, judges = np.stack([a[0], b[0]], axis=1), np.array([bool(t.judged) for t in terms.values()])
+        ends = np.cumsum([0, *(len(t.judged) for t in terms.values())])
+        links[judges] = np.stack([ends[:-1], ends[1:]], axis=1)[judges]
         values = [[*t.values, 0.0, 0.0, 0.0][:3] for t in terms.values()]
         column = [self.columns[group.name] for group in groups]
         spans = [range(c.start, c.stop)[slice(*(group.part or (None,)))] for c, group in zip(column, groups)]
@@ -79,17 +82,17 @@ class Probe:
         self._set("judged", [model.joint_link[model.joint(name)] for name in judged], int)
         self._set("kind", [int(getattr(self._program, t.kind)) for t in terms.values()], int)
         self._set("column", [c.start for c in self.columns.values()], int)
-        self._set("link", np.stack([a[0], b[0]], axis=1), int)
+        self._set("link", links, int)
         self._set("point", np.stack([a[1], b[1]], axis=1), wp.vec3)
         self._set("value", np.reshape(values, (-1, 3)), float)
         self._set("first", [span.start for span in spans], int)
         self._set("count", [len(span) for span in spans], int)
         self._set("weight", [group.weight for group in groups], float)
-        self.rows = 1
+        self._goals = None if goals is None else len(goals[0])
+        self.rows = self._goals or 1
         if goals is not None:
-            self.rows = len(goals[0])
-            self._set("goal_q", goals[0], float)
-            self._set("goal_qd", goals[1], float)
+            self._set_table("goal_q", goals[0], model.nq)
+            self._set_table("goal_qd", goals[1], model.nv)
         self._row = sim.new_rows()
         self._out, self._cost = sim.new_port(self.size), sim.new_port(1)
         self.want(np.zeros((self.rows, self.size)))
@@ -99,10 +102,16 @@ class Probe:
         array: wp.array = wp.array(np.asarray(values, kind), dtype=dtype, device=self.sim.device)
         setattr(self._probe, name, array)
 
+    def _set_table(self, name: str, values: Any, width: int) -> None:
+        rows = self._goals or len(values)
+        if np.shape(values) != (rows, width):
+            raise ValueError(f"{name} must have shape ({rows}, {width}), not {np.shape(values)}")
+        self._set(name, values, float)
+
     def want(self, wanted: Any) -> None:
-        """Observations (rows, size) that cost nothing."""
+        """Observations (rows, size) that cost nothing; a row for each of the goals, where there are any."""
+        self._set_table("wanted", wanted, self.size)
         self.rows = len(wanted)
-        self._set("wanted", wanted, float)
         inputs = [self._probe, self._row, self._out, self._cost]
         self._launch = self.sim.prepared(self._program, "observe", inputs)
 
