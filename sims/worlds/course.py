@@ -44,10 +44,15 @@ class Course:
                 if (column[place] >= 0).any():
                     raise ValueError(f"joint '{name}' is steered twice")
                 column[place] = self.columns + (np.arange(count) if isinstance(one, str) else 0)
-                gain[place] = 1.0 if isinstance(one, str) else one[name]
-            self.columns = max(self.columns, int(column.max(initial=-1)) + 1)
+                own = np.ones(count) if isinstance(one, str) else np.atleast_1d(one[name])
+                if own.shape != (count,):
+                    raise ValueError(f"joint '{name}' takes a gain for each of {count} dofs, not {one[name]}")
+                gain[place] = own
+            self.columns += count if isinstance(one, str) else 1
         self._course = course = sim.program("step").Course()
         self.rows = len(targets)
+        if np.shape(targets) != (self.rows, model.nq):
+            raise ValueError(f"targets must have shape (rows, {model.nq}), not {np.shape(targets)}")
         course.table = wp.array(np.asarray(targets, np.float32), dtype=float, device=sim.device)
         course.row = sim.new_rows()
         course.column = wp.array(column, dtype=int, device=sim.device)
@@ -73,6 +78,8 @@ class Course:
         rows = np.asarray(rows)
         if rows.min() < 0 or rows.max() > self.rows - count:
             raise IndexError(f"rows must lie in 0 .. {self.rows - count}")
+        if watch and watch.rows != self.rows:
+            raise ValueError(f"the watch is for a table of {watch.rows} rows, not of {self.rows}")
         sim, course = self.sim, self._course
         sim.set_rows(course.row, rows)
         if not sim.device.is_cpu:

@@ -89,7 +89,7 @@ class Watch:
     """Numbers by name, `(world_count, n)`; for `Course.step`. rows: of the course's table."""
 
     def __init__(self, sim: Simulation, terms: Mapping[str, Folded], rows: int):
-        self.sim, self.names = sim, list(terms)
+        self.sim, self.names, self.rows = sim, list(terms), rows
         model, program = sim.model, sim.program("watch")
         self.struct = struct = sim.program("step").Watch()
         nowhere = Place(model.body_names[0], (0.0, 0.0, 0.0))
