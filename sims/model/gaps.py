@@ -3,15 +3,22 @@ outside view of contact."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+if TYPE_CHECKING:
+    from .mjcf import Shape
+    from .model import Model
 
-def lowest_point(model, body_q: np.ndarray, bodies) -> np.ndarray:
+
+def lowest_point(model: Model, body_q: np.ndarray, bodies: Collection[int]) -> np.ndarray:
     """Height (frames,) [m] of the lowest point of the shapes of `bodies` (indices), body_q
     (frames, nbody, 7)."""
     heights = []
-    for shape in (s for s in model.shapes if s.body in set(bodies) and s.kind != "plane"):
+    for shape in (s for s in model.shapes if s.body in bodies and s.kind != "plane"):
         centre, turn = _place(shape, body_q)
         up = turn.inv().apply([0.0, 0.0, 1.0])
         if shape.kind == "box":
@@ -24,11 +31,13 @@ def lowest_point(model, body_q: np.ndarray, bodies) -> np.ndarray:
     return np.min(heights, axis=0)
 
 
-def gap_to_bodies(model, body_q: np.ndarray, bodies, points: np.ndarray) -> np.ndarray:
+def gap_to_bodies(
+    model: Model, body_q: np.ndarray, bodies: Collection[int], points: np.ndarray
+) -> np.ndarray:
     """Distance (frames,) [m] from points (frames, 3) to the nearest surface of the shapes of
     `bodies` (indices)."""
     distances = []
-    for shape in (s for s in model.shapes if s.body in set(bodies) and s.kind != "plane"):
+    for shape in (s for s in model.shapes if s.body in bodies and s.kind != "plane"):
         centre, turn = _place(shape, body_q)
         local = turn.inv().apply(points - centre)
         if shape.kind == "box":
@@ -42,6 +51,6 @@ def gap_to_bodies(model, body_q: np.ndarray, bodies, points: np.ndarray) -> np.n
     return np.min(distances, axis=0)
 
 
-def _place(shape, body_q: np.ndarray) -> tuple[np.ndarray, Rotation]:
+def _place(shape: Shape, body_q: np.ndarray) -> tuple[np.ndarray, Rotation]:
     body = Rotation.from_quat(body_q[:, shape.body, 3:])
     return body_q[:, shape.body, :3] + body.apply(shape.pos), body * Rotation.from_quat(shape.quat)

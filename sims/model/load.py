@@ -1,13 +1,14 @@
-"""From an MJCF file to a `Model`."""
+"""From an MJCF file to what a `Model` holds."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .joints import DOF_SIZE
+from .joints import DOF_SIZE, HINGE, Q_SIZE
 from .mjcf import (
     GEOMS,
     JOINTS,
@@ -19,12 +20,16 @@ from .mjcf import (
     read_shapes,
     xyzw,
 )
-from .model import Model
 from .slots import build_slots
 
+if TYPE_CHECKING:
+    import mujoco
 
-def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without: tuple[str, ...]) -> Model:
-    """The model of a file under a name; see `Model.load`."""
+
+def read_model(
+    path: Path, name: str, rigid: tuple[str, ...], pose: str, without: tuple[str, ...]
+) -> dict[str, Any]:
+    """The fields of the `Model` of a file; see `Model.load`."""
     m, keys, gone = compile_mjcf(path, rigid, pose, without)
     check_supported(m, path)
     t, bodies = read_links(m)
@@ -36,8 +41,7 @@ def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without:
         "com": inertia["link_com"],
         "count": np.bincount(bodies["body_link"][1:], minlength=len(t.link_parent)),
     }
-    slots = build_slots(m, geoms, shapes, t, bodies, links)
-    pairs = slots.pop("pairs")
+    slots, pairs = build_slots(m, geoms, shapes, t, bodies, links)
     stiffness = np.zeros(m.nv)
     for j in range(m.njnt):
         dofs = slice(m.jnt_dofadr[j], m.jnt_dofadr[j] + DOF_SIZE[JOINTS[int(m.jnt_type[j])]])
@@ -54,52 +58,43 @@ def load_mjcf(path: Path, name: str, rigid: tuple[str, ...], pose: str, without:
         "dof_stiffness": stiffness,
         "pair_erp": np.array([p["erp"] for p in pairs]),
         "pair_cfm": np.array([p["cfm"] for p in pairs]),
+        "q_spring": _order(m, m.qpos_spring),
+        "gravity": m.opt.gravity.copy(),
     }
-    model = Model(
-        name=name,
-        path=path,
-        timestep=float(m.opt.timestep),
-        nq=m.nq,
-        nv=m.nv,
-        body_names=[m.body(b).name or f"body{b}" for b in range(1, m.nbody)],
-        body_parent=m.body_parentid[1:] - 1,
-        body_mass=m.body_mass[1:].copy(),
-        body_com=m.body_ipos[1:].copy(),
-        body_inertia=_inertia_matrices(m),
-        joint_names=[m.joint(j).name or f"joint{j}" for j in range(m.njnt)],
-        joint_link=np.arange(1, m.njnt + 1),
-        joint_child=m.jnt_bodyid - 1,
-        shapes=shapes,
-        sites={
-            m.site(s).name: (
-                int(m.site_bodyid[s]) - 1,
-                m.site_pos[s].copy(),
-                xyzw(m.site_quat[s]),
-            )
+    in_link = Rotation.from_quat(bodies["body_turn"][1:])
+    tables["body_com"] = bodies["body_offset"][1:] + in_link.apply(m.body_ipos[1:])
+    keyframes = {key: _order(m, np.concatenate(list(joints.values()))) for key, joints in keys.items()}
+    return {
+        "name": name,
+        "path": path,
+        "timestep": float(m.opt.timestep),
+        "nq": m.nq,
+        "nv": m.nv,
+        "body_names": [m.body(b).name or f"body{b}" for b in range(1, m.nbody)],
+        "body_parent": m.body_parentid[1:] - 1,
+        "body_mass": m.body_mass[1:].copy(),
+        "body_com": m.body_ipos[1:].copy(),
+        "body_inertia": _inertia_matrices(m),
+        "joint_names": [m.joint(j).name or f"joint{j}" for j in range(m.njnt)],
+        "joint_link": np.arange(1, m.njnt + 1),
+        "joint_child": m.jnt_bodyid - 1,
+        "shapes": shapes,
+        "sites": {
+            m.site(s).name: (int(m.site_bodyid[s]) - 1, m.site_pos[s].copy(), xyzw(m.site_quat[s]))
             for s in range(m.nsite)
         },
-        keyframes={},
-        texts={
+        "keyframes": keyframes,
+        "texts": {
             _string(m.names, m.name_textadr[k]): " ".join(
                 word for word in _string(m.text_data, m.text_adr[k]).split() if word not in gone
             )
             for k in range(m.ntext)
         },
-        start_q=np.zeros(m.nq),
-        tables=tables,
-        pairs=pairs,
-        notes=notes,
-    )
-    model.keyframes = {
-        key: _order(model, np.concatenate(list(joints.values()))) for key, joints in keys.items()
+        "start_q": keyframes.get("start", _order(m, m.qpos0)).copy(),
+        "tables": tables,
+        "pairs": pairs,
+        "notes": notes,
     }
-    model.start_q = model.keyframes.get("start", _order(model, m.qpos0)).copy()
-    tables["q_spring"] = _order(model, m.qpos_spring)
-    tables["gravity"] = m.opt.gravity.copy()
-    in_link = Rotation.from_quat(tables["body_turn"])
-    tables["body_com"] = tables["body_offset"] + in_link.apply(m.body_ipos[1:])
-    tables["slot_flag"] = _flags(model)
-    return model
 
 
 def _string(data: bytes, start: int) -> str:
@@ -108,29 +103,16 @@ def _string(data: bytes, start: int) -> str:
     return data[start : data.index(b"\0", start)].decode()
 
 
-def _order(model: Model, qpos: np.ndarray) -> np.ndarray:
+def _order(m: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
     """MuJoCo's qpos with quaternions turned to xyzw."""
     q = np.array(qpos, float)
-    for k in model.quaternions():
-        q[k : k + 4] = xyzw(q[k : k + 4])
+    for kind, start in zip(m.jnt_type, m.jnt_qposadr):
+        if JOINTS[int(kind)] != HINGE:
+            turn = slice(start, start + Q_SIZE[JOINTS[int(kind)]])
+            q[turn][-4:] = xyzw(q[turn][-4:])
     return q
 
 
-def _inertia_matrices(m) -> np.ndarray:
+def _inertia_matrices(m: mujoco.MjModel) -> np.ndarray:
     R = Rotation.from_quat(xyzw(m.body_iquat[1:])).as_matrix()
     return np.einsum("bij,bj,bkj->bik", R, m.body_inertia[1:], R)
-
-
-def _flags(model: Model) -> np.ndarray:
-    """What a touch in each slot means: 1, a fall (part of the player other than its feet on the ground);
-    2, a bad contact (the ball on the player's body other than the hands)."""
-    feet, hands, ball = (model.named_bodies(k) for k in ("feet", "hands", "ball"))
-    flags = []
-    for a, b in zip(model.tables.get("slot_a", []), model.tables.get("slot_b", []), strict=True):
-        touching = {model.shapes[a].body, model.shapes[b].body}
-        moving = touching - {-1}
-        if len(moving) == 1:
-            flags.append(int(bool(feet) and not moving & (feet | ball)))
-        else:
-            flags.append(2 if touching & ball and not touching & hands else 0)
-    return np.array(flags, int)

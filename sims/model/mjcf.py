@@ -10,11 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .joints import BALL, FREE, HINGE
+
+if TYPE_CHECKING:
+    import mujoco
 
 JOINTS = {0: FREE, 1: BALL, 3: HINGE}
 """MuJoCo's joint types, but for the slide, which is not simulated."""
@@ -57,21 +61,21 @@ class Shape:
 class Tables:
     """Links (row 0 is the ground), dofs and bodies as arrays; see `kernels.tree.Tree` for each."""
 
-    link_parent: list = field(default_factory=lambda: [0])
-    link_joint: list = field(default_factory=lambda: [FREE])
-    link_q: list = field(default_factory=lambda: [0])
-    link_dof: list = field(default_factory=lambda: [0])
-    link_offset: list = field(default_factory=lambda: [np.zeros(3)])
-    link_turn: list = field(default_factory=lambda: [np.array([0, 0, 0, 1.0])])
-    link_axis: list = field(default_factory=lambda: [np.array([0, 0, 1.0])])
-    link_zero: list = field(default_factory=lambda: [0.0])
-    link_effort: list = field(default_factory=lambda: [ANYWHERE])
-    link_driven: list = field(default_factory=lambda: [0])
-    link_limited: list = field(default_factory=lambda: [0])
-    link_lower: list = field(default_factory=lambda: [0.0])
-    link_upper: list = field(default_factory=lambda: [0.0])
-    link_near: list = field(default_factory=lambda: [0.0])
-    link_sprung: list = field(default_factory=lambda: [0])
+    link_parent: list[int] = field(default_factory=lambda: [0])
+    link_joint: list[int] = field(default_factory=lambda: [FREE])
+    link_q: list[int] = field(default_factory=lambda: [0])
+    link_dof: list[int] = field(default_factory=lambda: [0])
+    link_offset: list[np.ndarray] = field(default_factory=lambda: [np.zeros(3)])
+    link_turn: list[np.ndarray] = field(default_factory=lambda: [np.array([0, 0, 0, 1.0])])
+    link_axis: list[np.ndarray] = field(default_factory=lambda: [np.array([0, 0, 1.0])])
+    link_zero: list[float] = field(default_factory=lambda: [0.0])
+    link_effort: list[float] = field(default_factory=lambda: [ANYWHERE])
+    link_driven: list[int] = field(default_factory=lambda: [0])
+    link_limited: list[int] = field(default_factory=lambda: [0])
+    link_lower: list[float] = field(default_factory=lambda: [0.0])
+    link_upper: list[float] = field(default_factory=lambda: [0.0])
+    link_near: list[float] = field(default_factory=lambda: [0.0])
+    link_sprung: list[int] = field(default_factory=lambda: [0])
 
 
 def xyzw(q: np.ndarray) -> np.ndarray:
@@ -86,7 +90,7 @@ def wxyz(q: np.ndarray) -> np.ndarray:
 
 def compile_mjcf(
     path: str | Path, rigid: tuple[str, ...] = (), pose: str = "start", without: tuple[str, ...] = ()
-):
+) -> tuple[mujoco.MjModel, dict[str, dict[str, np.ndarray]], set[str]]:
     """MuJoCo's model of an MJCF file; its keyframes: name -> {joint name: qpos} in joint order; and the names
     of the bodies that were left out.
 
@@ -128,12 +132,12 @@ def compile_mjcf(
     return model, keys, bodies - {model.body(b).name for b in range(model.nbody)}
 
 
-def _by_joint(m, qpos: np.ndarray) -> dict[str, np.ndarray]:
+def _by_joint(m: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
     parts = np.split(qpos, m.jnt_qposadr[1:])
     return {m.joint(j).name or f"joint{j}": part.copy() for j, part in zip(range(m.njnt), parts)}
 
 
-def _leave_out(spec, name: str, path) -> None:
+def _leave_out(spec: mujoco.MjSpec, name: str, path: Path) -> None:
     """Take a body at the top level, and all that hangs on it, out of a spec."""
     body = spec.body(name)
     if body is None or body.parent is None or body.parent.name != "world":
@@ -141,7 +145,13 @@ def _leave_out(spec, name: str, path) -> None:
     spec.delete(body)
 
 
-def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> None:
+def _freeze(
+    spec: mujoco.MjSpec,
+    m: mujoco.MjModel,
+    rigid: tuple[str, ...],
+    pose: dict[str, np.ndarray],
+    path: Path,
+) -> None:
     """Take the joints that match a pattern out of a spec, their bodies turned as in `pose`."""
     frozen = {name for name in pose if any(fnmatch(name, pattern) for pattern in rigid)}
     if not frozen:
@@ -168,7 +178,7 @@ def _freeze(spec, m, rigid, pose: dict[str, np.ndarray], path) -> None:
         spec.delete(joint)
 
 
-def check_supported(m, path: str | Path) -> None:
+def check_supported(m: mujoco.MjModel, path: str | Path) -> None:
     """Raise ModelError naming the first thing in a compiled model that is not simulated."""
 
     def refuse(what: str, advice: str) -> None:
@@ -217,7 +227,7 @@ def check_supported(m, path: str | Path) -> None:
             refuse(f"option flag {name}='disable'", f"leave {name} enabled")
 
 
-def _needed_flags() -> set:
+def _needed_flags() -> set[mujoco.mjtDisableBit]:
     """Parts of a step that a file may not switch off."""
     import mujoco
 
@@ -231,7 +241,7 @@ def _geom_type(kind: int) -> str:
     return mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
 
 
-def read_shapes(m) -> list[Shape]:
+def read_shapes(m: mujoco.MjModel) -> list[Shape]:
     """The geoms that collide, and those that only show, of a supported kind."""
     shapes = []
     for g in range(m.ngeom):
@@ -261,7 +271,7 @@ def read_shapes(m) -> list[Shape]:
     return shapes
 
 
-def read_links(m) -> tuple[Tables, dict[str, np.ndarray]]:
+def read_links(m: mujoco.MjModel) -> tuple[Tables, dict[str, np.ndarray]]:
     """The kinematic tree: one link per joint, and where each body sits in its link."""
     t = Tables()
     body_link = np.zeros(m.nbody, int)
@@ -304,7 +314,13 @@ def read_links(m) -> tuple[Tables, dict[str, np.ndarray]]:
     return t, bodies
 
 
-def read_inertia(m, body_link, body_offset, body_turn, link_count: int) -> dict[str, np.ndarray]:
+def read_inertia(
+    m: mujoco.MjModel,
+    body_link: np.ndarray,
+    body_offset: np.ndarray,
+    body_turn: np.ndarray,
+    link_count: int,
+) -> dict[str, np.ndarray]:
     """Mass, centre of mass and second moments of each link about its origin, in its axes."""
     mass = np.zeros(link_count)
     first = np.zeros((link_count, 3))
@@ -335,7 +351,7 @@ def _both_ways(low: float, high: float, what: str) -> float:
     return float(high)
 
 
-def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
+def read_drives(m: mujoco.MjModel, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """kp, kd per dof [N m/rad, N m s/rad] from position actuators; efforts go into `t`; and notes on
     actuators that are left to the user."""
     kp, kd = np.zeros(m.nv), np.zeros(m.nv)
@@ -343,7 +359,8 @@ def read_drives(m, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray,
     notes = []
     for j in range(m.njnt):
         if m.jnt_actfrclimited[j]:
-            limit = _both_ways(*m.jnt_actfrcrange[j], f"{path}: joint '{m.joint(j).name}'")
+            low, high = m.jnt_actfrcrange[j]
+            limit = _both_ways(low, high, f"{path}: joint '{m.joint(j).name}'")
             effort[m.jnt_dofadr[j]] = limit
     for a in range(m.nu):
         name = m.actuator(a).name or str(a)

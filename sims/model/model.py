@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...assets import path as asset
 from .joints import DOF_SIZE, KINDS, Q_SIZE, Coordinates, Joint, Kind, coordinates
+from .load import read_model
 from .mjcf import ModelError, Shape
 from .pose import forward
 from .roles import Roles, find_roles
+from .slots import Pair
 
 
 @dataclass
@@ -54,7 +57,7 @@ class Model:
     """(nq,) the keyframe `start`, or the file's zero pose"""
     tables: dict[str, np.ndarray]
     """arrays for `kernels.tree.Tree`, by its field names"""
-    pairs: list[dict]
+    pairs: list[Pair]
     """contact properties per pair of shapes"""
     notes: list[str] = field(default_factory=list)
 
@@ -74,13 +77,12 @@ class Model:
         Raises ModelError (a ValueError) when the file is missing, broken or holds something that is
         not simulated.
         """
-        from .load import load_mjcf
-
+        path, shown = Path(name), Path(name).stem
         if str(name) == "player":
-            from ...assets import path as asset
-
-            return load_mjcf(asset("player.xml"), "player", rigid, pose, without)
-        return load_mjcf(Path(name), Path(name).stem, rigid, pose, without)
+            path, shown = asset("player.xml"), "player"
+        model = Model(**read_model(path, shown, rigid, pose, without))
+        model.tables["slot_flag"] = _flags(model)
+        return model
 
     def convert_q(self, other: Model, joint_q: np.ndarray) -> np.ndarray:
         """joint_q (..., nq) of another model with joints of the same names, for this one; joints that
@@ -274,3 +276,18 @@ def _index(names: list[str], name: str, what: str) -> int:
     except ValueError:
         known = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
         raise KeyError(f"no {what} named {name!r}; there are: {known}") from None
+
+
+def _flags(model: Model) -> np.ndarray:
+    """What a touch in each slot means: 1, a fall (part of the player other than its feet on the ground);
+    2, a bad contact (the ball on the player's body other than the hands)."""
+    feet, hands, ball = (model.named_bodies(k) for k in ("feet", "hands", "ball"))
+    flags = []
+    for a, b in zip(model.tables.get("slot_a", []), model.tables.get("slot_b", []), strict=True):
+        touching = {model.shapes[a].body, model.shapes[b].body}
+        moving = touching - {-1}
+        if len(moving) == 1:
+            flags.append(int(bool(feet) and not moving & (feet | ball)))
+        else:
+            flags.append(2 if touching & ball and not touching & hands else 0)
+    return np.array(flags, int)

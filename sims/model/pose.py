@@ -107,7 +107,7 @@ class Limb:
         reach = np.hypot(a, b)
         return np.arctan2(b, a) + np.arccos(np.clip(wanted / reach, -1.0, 1.0))
 
-    def solve(self, start: np.ndarray, end: np.ndarray, hinge: np.ndarray):
+    def solve(self, start: np.ndarray, end: np.ndarray, hinge: np.ndarray) -> tuple[Rotation, np.ndarray]:
         """World rotation (n,) of the upper segment and hinge angle (n,) [rad] that put the end
         joint at `end`.
 

@@ -8,20 +8,38 @@ from __future__ import annotations
 
 import itertools
 import warnings
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from .joints import DOF_SIZE, FREE
-from .mjcf import Shape
+from .mjcf import Shape, Tables
 
+if TYPE_CHECKING:
+    import mujoco
+
+Place = tuple[int, np.ndarray, Rotation]
+"""A body's link, and its origin [m] and frame in it."""
 POINT_PLANE, SPHERE_CAPSULE, SPHERE_BOX, CAPSULE_CAPSULE = range(4)
+
+
+class Pair(TypedDict):
+    """Contact properties of two shapes that may touch."""
+
+    shapes: tuple[int, int]
+    """their indices"""
+    friction: float
+    restitution: float
+    erp: float
+    cfm: float
 
 
 class Chains:
     """Paths through the tree of links."""
 
-    def __init__(self, tables):
+    def __init__(self, tables: Tables):
         self.parent, self.joint = tables.link_parent, tables.link_joint
         self.dof, self.offset = tables.link_dof, tables.link_offset
 
@@ -51,7 +69,7 @@ class Chains:
         return [dof for i in links for dof in self.dofs(i)]
 
 
-def may_touch(m, a: int, b: int) -> bool:
+def may_touch(m: mujoco.MjModel, a: int, b: int) -> bool:
     """MuJoCo's filter for two geoms."""
     if not (m.geom_contype[a] & m.geom_conaffinity[b] or m.geom_contype[b] & m.geom_conaffinity[a]):
         return False
@@ -79,7 +97,13 @@ def touch_points(shape: Shape) -> list[tuple[np.ndarray, float]]:
     return [(shape.pos + R.apply(shape.size * c), 0.0) for c in corners]
 
 
-def drop_shared(points, link: int, place, shapes: list[Shape], chains: Chains):
+def drop_shared(
+    points: list[tuple[np.ndarray, float]],
+    link: int,
+    place: list[Place],
+    shapes: list[Shape],
+    chains: Chains,
+) -> list[tuple[np.ndarray, float]]:
     """Touch points less those at the link's own joint where the parent link ends in one as well: the
     phalanges of a finger need one contact per knuckle, not two."""
     parent = chains.parent[link]
@@ -100,9 +124,16 @@ def drop_shared(points, link: int, place, shapes: list[Shape], chains: Chains):
     ]
 
 
-def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
-    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels; `geoms[k]` is the geom of
-    shape k."""
+def build_slots(
+    m: mujoco.MjModel,
+    geoms: list[int],
+    shapes: list[Shape],
+    tables: Tables,
+    bodies: dict[str, np.ndarray],
+    links: dict[str, np.ndarray],
+) -> tuple[dict[str, np.ndarray], list[Pair]]:
+    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels, and the pairs of shapes that
+    may touch; `geoms[k]` is the geom of shape k."""
     chains = Chains(tables)
     place = [
         (
@@ -112,10 +143,19 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
         )
         for s in shapes
     ]
-    rows, pairs, responses = [], [], []
+    rows: list[dict[str, Any]] = []
+    pairs: list[Pair] = []
+    responses: list[list[int]] = []
     flights = []
 
-    def add(kind, a, b, plane=(0, 0, 1, 0), point=(0, 0, 0), radius=0.0):
+    def add(
+        kind: int,
+        a: int,
+        b: int,
+        plane: ArrayLike = (0, 0, 1, 0),
+        point: ArrayLike = (0, 0, 0),
+        radius: float = 0.0,
+    ) -> None:
         link_a = 0 if kind == POINT_PLANE else int(place[a][0])
         link_b = int(place[b][0])
         dofs = chains.response(link_a, link_b)
@@ -128,7 +168,7 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
                 slot_link_a=link_a,
                 slot_link_b=link_b,
                 slot_meet=chains.meet(link_a, link_b),
-                slot_dof=sum(map(len, responses)),
+                slot_dof=sum(len(dofs) for dofs in responses),
                 slot_length=len(dofs),
                 slot_plane=np.asarray(plane, float),
                 slot_point=np.asarray(point, float),
@@ -173,15 +213,13 @@ def build_slots(m, geoms, shapes, tables, bodies, links) -> dict:
             stacklevel=4,
         )
     table = {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
-    table["pairs"] = pairs
     table["flight_link"], table["flight_slot"] = np.array(flights, int).reshape(-1, 2).T
     table["slot_flight"] = np.isin(np.arange(len(rows)), table["flight_slot"]).astype(int)
     table["response_dof"] = np.array([dof for dofs in responses for dof in dofs], int)
-    table |= shape_tables(shapes, place)
-    return table
+    return table | shape_tables(shapes, place), pairs
 
 
-def combine(m, ga, gb, a: Shape, b: Shape, ia: int, ib: int) -> dict:
+def combine(m: mujoco.MjModel, ga: int, gb: int, a: Shape, b: Shape, ia: int, ib: int) -> Pair:
     """Contact properties of two shapes: friction as MuJoCo (the larger, or the one with priority),
     restitution the product, erp and cfm the mean."""
     friction = max(a.friction, b.friction)
@@ -189,7 +227,7 @@ def combine(m, ga, gb, a: Shape, b: Shape, ia: int, ib: int) -> dict:
     if m.geom_priority[ga] != m.geom_priority[gb]:
         chief = a if m.geom_priority[ga] > m.geom_priority[gb] else b
         friction, condim = chief.friction, chief.condim
-    return dict(
+    return Pair(
         shapes=(ia, ib),
         friction=friction if condim == 3 else 0.0,
         restitution=a.restitution * b.restitution,
@@ -198,15 +236,17 @@ def combine(m, ga, gb, a: Shape, b: Shape, ia: int, ib: int) -> dict:
     )
 
 
-def shape_tables(shapes: list[Shape], place) -> dict:
+def shape_tables(shapes: list[Shape], place: list[Place]) -> dict[str, np.ndarray]:
     """Shapes in their links' frames."""
-    table = dict(shape_link=[], shape_pos=[], shape_turn=[], shape_half=[], shape_radius=[])
+    names = ("shape_link", "shape_pos", "shape_turn", "shape_half", "shape_radius")
+    table: dict[str, list[Any]] = {name: [] for name in names}
     for s, (link, offset, frame) in zip(shapes, place, strict=True):
         turn = frame * Rotation.from_quat(s.quat)
-        half = {
-            "box": lambda s=s: s.size,
-            "capsule": lambda s=s, turn=turn: turn.apply([0, 0, s.size[1]]),
-        }.get(s.kind, lambda: np.zeros(3))()
+        half = np.zeros(3)
+        if s.kind == "box":
+            half = s.size
+        elif s.kind == "capsule":
+            half = turn.apply([0, 0, s.size[1]])
         table["shape_link"].append(link)
         table["shape_pos"].append(offset + frame.apply(s.pos))
         table["shape_turn"].append(turn.as_quat())
