@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..model import Model
 from ..reference.reference import Reference
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import place_palm
@@ -37,7 +38,7 @@ class Carry:
     stance: Dribble = STANCE
 
 
-def carry(model, style: Carry = Carry()) -> tuple[Reference, np.ndarray, np.ndarray]:
+def carry(model: Model, style: Carry = Carry()) -> tuple[Reference, np.ndarray, np.ndarray]:
     """The swing on the player, cyclic: reference, ball (frames, 3) [m], touch (frames, 2) bool."""
     steps = round(style.period / model.timestep)
     phase = 2.0 * np.pi * np.arange(steps + 1) / steps

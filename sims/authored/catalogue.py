@@ -9,6 +9,7 @@ import numpy as np
 
 from ..ball.ball import Ball, find_checkpoints
 from ..ball.hands import find_hands
+from ..model import Model
 from ..reference.reference import Reference
 from .carry import carry
 from .dribble import dribble_right
@@ -24,7 +25,7 @@ class Authored:
     ball: Ball
 
 
-def _dribble(model) -> tuple[Reference, np.ndarray, np.ndarray]:
+def _dribble(model: Model) -> tuple[Reference, np.ndarray, np.ndarray]:
     clip = dribble_right(model)
     times = clip.reference.timestep * np.arange(clip.reference.frame_count)
     touch = np.zeros((len(times), 2), bool)
@@ -33,7 +34,7 @@ def _dribble(model) -> tuple[Reference, np.ndarray, np.ndarray]:
     return clip.reference, clip.reference.joint_q[:, place : place + 3], touch
 
 
-AUTHORED: dict[str, Callable] = {
+AUTHORED: dict[str, Callable[[Model], tuple[Reference, np.ndarray, np.ndarray]]] = {
     "carry": carry,
     "dribble_right": _dribble,
     "waist": waist,
@@ -41,7 +42,7 @@ AUTHORED: dict[str, Callable] = {
 }
 
 
-def authored_clip(model, name: str) -> Authored:
+def authored_clip(model: Model, name: str) -> Authored:
     """An authored clip on the player. Raises KeyError for a name that is none."""
     reference, path, touch = AUTHORED[name](model)
     joint_q = reference.joint_q.copy()

@@ -17,8 +17,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from ..ball.flight import GRAVITY, Bounce
-from ..model import pose
+from ..ball.flight import GRAVITY, Bounce, T
+from ..model import Model, pose
 from ..reference.reference import Reference, resample_q
 
 Heights = Callable[[np.ndarray], np.ndarray]
@@ -74,7 +74,7 @@ class AuthoredClip:
     restitution: float
 
 
-def dribble_right(model, style: Dribble = Dribble()) -> AuthoredClip:
+def dribble_right(model: Model, style: Dribble = Dribble()) -> AuthoredClip:
     """The authored right-hand dribble on the player, at its time step; the ball's path is in its
     coordinates.
 
@@ -119,7 +119,7 @@ class Push:
     growth: float
     """[m/s^3], k"""
 
-    def at(self, since: np.ndarray) -> np.ndarray:
+    def at(self, since: T) -> T:
         """Height [m] `since` seconds after the catch."""
         return self.catch + self.back * since - 0.5 * GRAVITY * since**2 - self.growth * since**3 / 6.0
 
@@ -175,7 +175,7 @@ def stroke(style: Dribble, radius: float) -> tuple[float, Heights, Heights]:
     return flight, ball, palm
 
 
-def fingers(model, curl: float, sides: str = "r") -> np.ndarray:
+def fingers(model: Model, curl: float, sides: str = "r") -> np.ndarray:
     """The start pose (nq,) with the fingers of these sides part of the way from flat to it."""
     poses = np.stack([model.keyframes["flat"], model.start_q])
     joint_q = np.array(model.start_q, dtype=float)
@@ -186,7 +186,8 @@ def fingers(model, curl: float, sides: str = "r") -> np.ndarray:
     return joint_q
 
 
-def trunk(model, joint_q, style: Dribble, phase) -> None:
+def trunk(model: Model, joint_q: np.ndarray, style: Dribble, phase: np.ndarray) -> None:
+    """Pelvis, back and neck: the lean, and what goes with the push at `phase` (frames,) [rad]."""
     root = model.q_slice(model.root)
     joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
     joint_q[:, root.start + 1] = -0.01
@@ -202,7 +203,8 @@ def trunk(model, joint_q, style: Dribble, phase) -> None:
         joint_q[:, place] = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
 
 
-def legs(model, joint_q, style: Dribble) -> None:
+def legs(model: Model, joint_q: np.ndarray, style: Dribble) -> None:
+    """Both legs, solved for feet on the ground."""
     zero = model.zero_pose[:, :3]
     for side, (forward, left, out) in zip("lr", style.feet):
         ankle = np.array([forward, left, zero[model.body(f"{side}_foot"), 2]])
@@ -211,7 +213,7 @@ def legs(model, joint_q, style: Dribble) -> None:
         pose.place_limb(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
 
 
-def _left_arm(model, joint_q, phase) -> None:
+def _left_arm(model: Model, joint_q: np.ndarray, phase: np.ndarray) -> None:
     """Hangs beside the body, half bent in front, swinging a little against the push."""
     upper, lower, _ = pose.limb_bodies(model, "l_elbow")
     zero = model.zero_pose[:, :3]
@@ -219,13 +221,16 @@ def _left_arm(model, joint_q, phase) -> None:
     down = np.column_stack([np.sin(0.12 + swing), np.full_like(phase, 0.24), -np.cos(0.12 + swing)])
     inward = np.tile([0.35, -1.0, 0.0], (len(phase), 1))
     own = pose.frame_of(zero[lower] - zero[upper], model.joint_axis("l_elbow"))
-    parent = pose.forward(model, joint_q)[:, model.body_parent[upper], 3:]
+    above = int(model.body_parent[upper])
+    parent = pose.forward(model, joint_q, [above])[:, above, 3:]
     turn = Rotation.from_quat(parent).inv() * pose.frame_of(down, inward) * own.inv()
     joint_q[:, model.q_slice("l_shoulder")] = turn.as_quat()
     joint_q[:, model.q_slice("l_elbow")] = np.radians(50.0) + swing[:, None]
 
 
-def _right_arm(model, joint_q, under, radius: float, tilt, roll: float) -> None:
+def _right_arm(
+    model: Model, joint_q: np.ndarray, under: np.ndarray, radius: float, tilt: np.ndarray, roll: float
+) -> None:
     """Palm down on a ball centred at `under` (frames, 3) [m], whether there is one or not.
 
     The fingers point ahead, `tilt` (frames,) [rad] below the horizon.

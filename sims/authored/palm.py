@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..model import pose
+from ..model import Model, pose
 from ..reference.mirror import FLIP
 from ..retarget.reach import keep_range
 
@@ -13,7 +14,16 @@ CLEAR = 0.001
 """[m] between palm and ball."""
 
 
-def place_palm(model, joint_q, side: str, centre, normal, fingers, elbow, radius: float) -> None:
+def place_palm(
+    model: Model,
+    joint_q: np.ndarray,
+    side: str,
+    centre: np.ndarray,
+    normal: ArrayLike,
+    fingers: ArrayLike,
+    elbow: ArrayLike,
+    radius: float,
+) -> None:
     """Solve an arm of joint_q (frames, nq) in place so that its palm lies on a ball centred at `centre`.
 
     centre: (frames, 3) [m]; normal: (frames, 3), out of the palm, toward the ball's centre; fingers: (frames,

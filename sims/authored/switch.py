@@ -12,9 +12,10 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+from ..model import Model
 from ..reference.mirror import mirrored
 from ..reference.reference import Reference
-from .dribble import Dribble, fingers, legs, stroke, trunk
+from .dribble import Dribble, Heights, fingers, legs, stroke, trunk
 from .palm import place_palm, shift
 
 STANCE = Dribble(
@@ -41,7 +42,7 @@ class Switch:
     stance: Dribble = STANCE
 
 
-def switch(model, style: Switch = Switch()) -> tuple[Reference, np.ndarray, np.ndarray]:
+def switch(model: Model, style: Switch = Switch()) -> tuple[Reference, np.ndarray, np.ndarray]:
     """The change of hands on the player, cyclic: reference, ball (frames, 3) [m], touch (frames, 2) bool. The
     clip begins as the ball leaves the right hand."""
     half = round(style.stance.period / model.timestep)
@@ -71,7 +72,7 @@ def switch(model, style: Switch = Switch()) -> tuple[Reference, np.ndarray, np.n
     return Reference(joint_q, model.timestep), ball, held
 
 
-def _across(style: Switch, times, period: float, flight: float) -> np.ndarray:
+def _across(style: Switch, times: np.ndarray, period: float, flight: float) -> np.ndarray:
     """[m] to the left: straight in flight, out and back in a hand."""
     speed, hold = 2.0 * style.wide / flight, period - flight
     t = times % period
@@ -80,7 +81,16 @@ def _across(style: Switch, times, period: float, flight: float) -> np.ndarray:
     return np.where((times // period).astype(int) % 2 == 0, side, -side)
 
 
-def _right_palm(style: Switch, times, ball, palm, period, flight, late, radius):
+def _right_palm(
+    style: Switch,
+    times: np.ndarray,
+    ball: np.ndarray,
+    palm: Heights,
+    period: float,
+    flight: float,
+    late: float,
+    radius: float,
+) -> tuple[np.ndarray, np.ndarray]:
     """Centre (frames, 3) [m] of a ball under the right palm, there or not, and the palm's normal."""
     speed = 2.0 * style.wide / flight
     top, step = float(ball[0, 2]), 1e-4
@@ -108,7 +118,7 @@ def _right_palm(style: Switch, times, ball, palm, period, flight, late, radius):
     return centre, normal
 
 
-def _level(model, joint_q: np.ndarray) -> None:
+def _level(model: Model, joint_q: np.ndarray) -> None:
     """Take the turn to one side out of the trunk, in place: both halves of the cycle are alike."""
     joint_q[:, 1] = 0.0
     for place in (slice(3, 7), *(model.q_slice(j) for j in ("lower_back", "torso", "neck"))):

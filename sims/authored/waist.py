@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ..model import Model
 from ..reference.reference import Reference
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import MIRROR, place_palm
@@ -54,7 +55,7 @@ class Waist:
     stance: Dribble = STANCE
 
 
-def waist(model, style: Waist = Waist()) -> tuple[Reference, np.ndarray, np.ndarray]:
+def waist(model: Model, style: Waist = Waist()) -> tuple[Reference, np.ndarray, np.ndarray]:
     """The circle on the player, cyclic: reference, ball (frames, 3) [m], touch (frames, 2) bool. The clip
     begins with the ball in front; it goes to the left first."""
     steps = round(style.period / model.timestep)
@@ -85,7 +86,7 @@ def waist(model, style: Waist = Waist()) -> tuple[Reference, np.ndarray, np.ndar
     return Reference(joint_q, model.timestep), ball, touch
 
 
-def _oval(style: Waist, angle) -> tuple[np.ndarray, np.ndarray]:
+def _oval(style: Waist, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 3) [m] on the ball's way and the directions (n, 3) out of it; angle 0 is in front."""
     a, b = style.oval
     place = np.column_stack([style.middle + a * np.cos(angle), b * np.sin(angle), 0.0 * angle + style.height])

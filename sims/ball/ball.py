@@ -6,10 +6,14 @@ It is inferred from the hands' motion alone, or, where the recording has a ball,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..model import Model
+from ..recording import Motion
+from ..reference import Reference
+from ..retarget.retarget import Retargeted
 from ..signals import runs
 from . import flight
 from .hands import Hands, find_hands
@@ -47,7 +51,7 @@ class Ball:
         return found
 
 
-def inferred_ball(model, reference) -> Ball | None:
+def inferred_ball(model: Model, reference: Reference) -> Ball | None:
     """The ball that the hands of a reference play with, from their motion alone; None when nothing shows
     one."""
     hands = find_hands(model, reference)
@@ -60,12 +64,12 @@ def inferred_ball(model, reference) -> Ball | None:
     return Ball(path, possession.touch, rows, heights, possession.flights)
 
 
-def recorded_ball(model, retargeted, motion) -> Ball | None:
+def recorded_ball(model: Model, retargeted: Retargeted, motion: Motion) -> Ball | None:
     """The ball as `motion` recorded it, in the world of the motion that was retargeted; None when it has
     none."""
+    motion = motion.resample(1.0 / model.timestep)
     if motion.ball is None or motion.ball_held is None:
         return None
-    motion = motion.resample(1.0 / model.timestep)
     hands = find_hands(model, retargeted.reference)
     path = retargeted.scale * motion.ball - retargeted.ground[:, None] * [0.0, 0.0, 1.0]
     _set_on_ground(path, hands.radius)
@@ -75,6 +79,12 @@ def recorded_ball(model, retargeted, motion) -> Ball | None:
     rows = find_checkpoints(path[:, 2], touch)
     heights = tuple(_height(hands, touch, row) for row in rows)
     return Ball(path, touch, rows, heights, recorded=True)
+
+
+def mirrored_ball(ball: Ball) -> Ball:
+    """A ball in the mirror, with its contacts on the other hand."""
+    flights = tuple(Flight(f.release, f.catch, 1 - f.hand, 1 - f.next_hand) for f in ball.flights)
+    return replace(ball, path=ball.path * [1.0, -1.0, 1.0], touch=ball.touch[:, ::-1].copy(), flights=flights)
 
 
 def _set_on_ground(path: np.ndarray, radius: float) -> None:
@@ -91,7 +101,7 @@ def ball_path(hands: Hands, touch: np.ndarray, flights: tuple[Flight, ...]) -> n
     """Centres (frames, 3) [m]: with the hand or between the hands that have it, falling and bouncing in its
     flights, thrown where it is let go for good, at its first place before anyone has it."""
     frames = len(touch)
-    held = touch.any(axis=1)
+    held = np.any(touch, axis=1)
     weight = np.where(held[:, None], touch, 0.0)
     path = np.einsum("fh,fhk->fk", weight, hands.centre) / np.maximum(weight.sum(axis=1), 1.0)[:, None]
     for first, last in runs(~held):
@@ -122,7 +132,7 @@ def find_checkpoints(height: np.ndarray, touch: np.ndarray) -> tuple[int, ...]:
     """Rows at which a ball of height (frames,) [m] is highest while hands have it, one per contact; contacts
     that are cut by the clip's ends count when the ball is highest inside them."""
     rows = []
-    held = touch.any(axis=1)
+    held = np.any(touch, axis=1)
     for first, last in runs(held):
         row = first + int(np.argmax(height[first : last + 1]))
         inside = first < row < last

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 
+T = TypeVar("T", float, np.ndarray)
 GRAVITY, BOUNCE = 9.81, 0.8
 """[m/s^2] and [-], of the ball in references; the simulated one has its model's."""
 FASTEST = 15.0
@@ -28,18 +30,18 @@ class Bounce:
     @cached_property
     def impact(self) -> float:
         """[m/s] at which it meets the ground"""
-        return np.sqrt(self.speed**2 + 2.0 * GRAVITY * max(self.height - self.radius, 0.0))
+        return float(np.sqrt(self.speed**2 + 2.0 * GRAVITY * max(self.height - self.radius, 0.0)))
 
     @cached_property
     def down(self) -> float:
         """[s] until it does"""
-        return float((self.impact - self.speed) / GRAVITY)
+        return (self.impact - self.speed) / GRAVITY
 
-    def falling(self, since: np.ndarray) -> np.ndarray:
+    def falling(self, since: T) -> T:
         """Height [m] `since` seconds after it was let go, before the ground."""
         return self.height - self.speed * since - 0.5 * GRAVITY * since**2
 
-    def rising(self, after: np.ndarray) -> np.ndarray:
+    def rising(self, after: T) -> T:
         """Height [m] `after` seconds on from the ground, up to the second time there."""
         return self.radius + self.restitution * self.impact * after - 0.5 * GRAVITY * after**2
 
@@ -65,7 +67,7 @@ def speed_to_meet(height: float, after: float, duration: float, radius: float) -
 
 def speed_to_return(height: float, radius: float) -> float:
     """Downward speed [m/s] with which a ball comes back to just the `height` [m] that it leaves."""
-    return np.sqrt(2.0 * GRAVITY * max(height - radius, 0.0) * (BOUNCE**-2 - 1.0))
+    return float(np.sqrt(2.0 * GRAVITY * max(height - radius, 0.0) * (BOUNCE**-2 - 1.0)))
 
 
 def thrown(place: np.ndarray, velocity: np.ndarray, times: np.ndarray, radius: float) -> np.ndarray:

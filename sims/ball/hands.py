@@ -8,7 +8,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from ..model import pose
+from ..model import Model, pose
+from ..reference import Reference
 
 SMOOTH = 0.02
 """[s]"""
@@ -32,7 +33,7 @@ class Hands:
     """[s]"""
 
 
-def find_hands(model, reference) -> Hands:
+def find_hands(model: Model, reference: Reference) -> Hands:
     """The hands of a model in a reference. Raises ModelError for a model without palms, shoulders or a
     ball."""
     palms = [model.sites[palm] for palm in model.roles.both("palms")]

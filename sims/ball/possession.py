@@ -84,7 +84,7 @@ def _without_both(hands: Hands, touch: np.ndarray, begin: int, end: int) -> list
     the flights in it."""
     frames = len(touch)
     pushed = find_pushes(hands, begin, end)
-    flights = []
+    flights: list[Flight] = []
     if pushed:
         hand, start = pushed[0][1], begin
     elif begin == 0 or (end == frames and not _throw(hands, begin, end, _higher(hands, begin))):
@@ -179,14 +179,13 @@ def _flight(hands: Hands, push: tuple[int, int], after: tuple[int, int] | None, 
     row, hand = push
     release = min(row + round(LEAVES / hands.timestep), end)
     last = min(end if after is None else after[0], row + round(LONGEST / hands.timestep))
-    best = None
+    ways = []
     for other in (hand, 1 - hand) if after is None else (after[1],):
         catch = _meets(hands, row, hand, other, release, last)
         across = hands.centre[min(catch, end - 1), other] - hands.centre[row, hand]
-        across = np.linalg.norm(across[:2] - hands.velocity[row, hand, :2] * (catch - row) * hands.timestep)
-        if best is None or across < best[0]:
-            best = (across, Flight(release, catch, hand, other))
-    return best[1]
+        across = across[:2] - hands.velocity[row, hand, :2] * (catch - row) * hands.timestep
+        ways.append((float(np.linalg.norm(across)), Flight(release, catch, hand, other)))
+    return min(ways, key=lambda way: way[0])[1]
 
 
 def _meets(hands: Hands, row: int, hand: int, other: int, release: int, last: int) -> int:

@@ -6,6 +6,7 @@ Knows the names of CMU (BVH and ASF), BallPlay-M, Mixamo, LAFAN and most plain `
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,7 +24,7 @@ its `LeftFingerBase` goes before; a `Shoulder` beside an `Arm` is a collar bone.
 SIDES = ("left", "right")
 
 
-def parts(names, parents) -> dict[str, int]:
+def parts(names: Sequence[str], parents: np.ndarray) -> dict[str, int]:
     """The joints found: "head", and for each side "left_hip", "left_knee", "left_ankle", "left_toe",
     "left_shoulder", "left_elbow", "left_wrist", and the tips of the toes and of the longest fingers,
     "left_toe_tip", "left_hand". A part that no name tells is not in it."""
@@ -71,7 +72,7 @@ def _plain(name: str) -> tuple[str, str]:
     return "", word
 
 
-def _below(parents, joint: int) -> list[int]:
+def _below(parents: np.ndarray, joint: int) -> list[int]:
     """A joint and all joints that hang from it."""
     found = [joint]
     for child in range(joint + 1, len(parents)):
@@ -80,7 +81,7 @@ def _below(parents, joint: int) -> list[int]:
     return found
 
 
-def _finger_tip(names, parents, wrist: int) -> int:
+def _finger_tip(names: Sequence[str], parents: np.ndarray, wrist: int) -> int:
     """The end of the middle finger, else of the index finger, else of any that is no thumb."""
     below = _below(parents, wrist)
     for word in ("middle", "index", ""):

@@ -95,8 +95,8 @@ def frozen(motion: Motion) -> list[Event]:
         return []
     turns = Rotation.from_quat(motion.rotations.reshape(-1, 4))
     count = motion.frame_count
-    turns = (turns[: (count - 1) * joints].inv() * turns[joints:]).magnitude()
-    speed = turns.reshape(count - 1, joints) * motion.rate
+    apart = np.asarray((turns[: (count - 1) * joints].inv() * turns[joints:]).magnitude())
+    speed = apart.reshape(count - 1, joints) * motion.rate
     alive = (speed > STILL).mean(axis=0) > 0.02
     found = {"root": 0} | anatomy.parts(motion.joint_names, motion.parents)
     events = []

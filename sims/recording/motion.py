@@ -7,7 +7,9 @@ named `<parent>_end`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -47,7 +49,7 @@ class Motion:
     ball_held: np.ndarray | None = None
     """(frames,) bool, a hand holds or touches the ball."""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         joints, frames = len(self.joint_names), len(self.root_position)
         for field, shape in (
             ("parents", (joints,)),
@@ -117,7 +119,7 @@ class Motion:
             **self._recorded(lambda values: interpolate_lines(values, at)),
         )
 
-    def _recorded(self, change) -> dict[str, np.ndarray]:
+    def _recorded(self, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Any]:
         """The recorded fields that there are, each with `change` applied; true or false stays so."""
         has = {name: getattr(self, name) for name in RECORDED if getattr(self, name) is not None}
         new = {name: change(values.astype(float)) for name, values in has.items()}
@@ -134,7 +136,9 @@ class Motion:
         return positions[0], frames[0]
 
 
-def _forward(parents, offsets, rotations, root_position):
+def _forward(
+    parents: np.ndarray, offsets: np.ndarray, rotations: np.ndarray, root_position: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     positions = np.empty((*rotations.shape[:2], 3))
     frames = [Rotation.from_quat(rotations[:, 0])]
     positions[:, 0] = root_position

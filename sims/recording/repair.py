@@ -7,6 +7,7 @@ too; nothing is singular, and a steady spin of any number of turns stays what it
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from . import anatomy, defects
 from .motion import RECORDED, Motion
 from .stance import stance
 
+Interpolate = Callable[[np.ndarray, np.ndarray], np.ndarray]
 REPAIRS = ("spikes", "toes", "lowpass", "ground")
 """In the order in which they are made."""
 WINDOW = 4
@@ -35,7 +37,7 @@ SOLE = 0.02
 """[m] Height of the lowest joint of a standing foot: what BallPlay-M, whose ground is known, shows."""
 
 
-def repair(motion: Motion, names) -> tuple[Motion, list[str]]:
+def repair(motion: Motion, names: Collection[str]) -> tuple[Motion, list[str]]:
     """The motion with the named repairs, and a note on each. Raises ValueError for an unknown name."""
     for name in names:
         if name not in REPAIRS:
@@ -56,7 +58,7 @@ def spikes(motion: Motion) -> tuple[Motion, str]:
     rotations, positions = motion.rotations.copy(), motion.positions
     joints, touched = defects.watched(motion), {}
 
-    def bridge(name, values, flags, interpolate):
+    def bridge(name: str, values: np.ndarray, flags: np.ndarray, interpolate: Interpolate) -> np.ndarray:
         if not 0 < flags.sum() <= SPIKE_SHARE * len(flags):
             return values
         touched[name] = int(flags.sum())
@@ -161,7 +163,7 @@ def _off(seen: np.ndarray, least: float) -> np.ndarray:
     return off
 
 
-def _bridge(values: np.ndarray, flags: np.ndarray, interpolate) -> np.ndarray:
+def _bridge(values: np.ndarray, flags: np.ndarray, interpolate: Interpolate) -> np.ndarray:
     """Values (frames, n) with those flagged (frames,) taken from between their good neighbours."""
     good = np.flatnonzero(~flags)
     at = np.interp(np.arange(len(values)), good, np.arange(len(good)))

@@ -9,10 +9,12 @@ centre of mass, where the zero moment point is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps, pose
+from ..model import Model, gaps, pose
 from ..signals import low_pass
 from .reference import Reference, integrate
 
@@ -26,7 +28,9 @@ LEVER = 0.1
 """[m] farthest that the ground's force acts from the middle of a foot."""
 
 
-def leading_targets(model, reference: Reference, feet=(), root_lead: float = 0.0) -> np.ndarray:
+def leading_targets(
+    model: Model, reference: Reference, feet: Sequence[str] = (), root_lead: float = 0.0
+) -> np.ndarray:
     """Targets (frames, nq) for a reference.
 
     feet: bodies that may stand on the ground; without them only the damping is paid. root_lead [s]:
@@ -48,7 +52,7 @@ def leading_targets(model, reference: Reference, feet=(), root_lead: float = 0.0
     return integrate(model, reference.joint_q, ahead)
 
 
-def holding_torques(model, reference: Reference, feet) -> np.ndarray:
+def holding_torques(model: Model, reference: Reference, feet: Sequence[str]) -> np.ndarray:
     """Joint torques (frames, nv) [N m] under which the reference carries itself; zero at free
     joints."""
     body_q = pose.forward(model, reference.joint_q)
@@ -83,7 +87,9 @@ def _acceleration(places: np.ndarray, timestep: float) -> np.ndarray:
     return np.gradient(np.gradient(smooth, timestep, axis=0), timestep, axis=0)
 
 
-def _ground_forces(model, body_q, com, push, feet):
+def _ground_forces(
+    model: Model, body_q: np.ndarray, com: np.ndarray, push: np.ndarray, feet: list[int]
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Where (frames, 3) [m] and how hard (frames, 3) [N] the ground pushes each foot.
 
     The whole force acts at the zero moment point; it is shared by the feet that are down, in the
@@ -93,14 +99,14 @@ def _ground_forces(model, body_q, com, push, feet):
     moment = np.cross(com, push).sum(axis=1)
     up = np.maximum(force[:, 2:], 1.0)
     point = np.concatenate([-moment[:, 1:2] / up, moment[:, :1] / up, 0.0 * up], axis=1)
-    middles, down = [], []
+    middles, standing = [], []
     for foot in feet:
         turn = Rotation.from_quat(body_q[:, foot, 3:])
         middle = body_q[:, foot, :3] + turn.apply(model.first_shape(foot).pos)
         middles.append(middle * [1.0, 1.0, 0.0])
         low = gaps.lowest_point(model, body_q, model.descendants(foot))
-        down.append(np.clip(1.5 - low / STANDING, 0.0, 1.0))
-    down = np.array(down)
+        standing.append(np.clip(1.5 - low / STANDING, 0.0, 1.0))
+    down = np.array(standing)
     if len(feet) == 2:
         across = middles[1] - middles[0]
         share = np.sum((point - middles[0]) * across, axis=1) / np.sum(across**2, axis=1)

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..ball.ball import Ball
-from ..ball.possession import Flight
+from ..model import Model
 from .reference import Reference
 
 FLIP = np.array([-1.0, 1.0, -1.0])
@@ -16,7 +15,7 @@ MIRROR = {"ball": np.array([*FLIP, 1.0]), "free": np.array([1.0, -1.0, 1.0, *FLI
 """And to the coordinates of joints that turn."""
 
 
-def mirrored(model, reference: Reference) -> Reference:
+def mirrored(model: Model, reference: Reference) -> Reference:
     """The reference in the mirror. Its mirror image is the reference again.
 
     Joints are paired by their names, `l_` with `r_`; joints without a side stay. Raises ValueError when a
@@ -36,13 +35,7 @@ def mirrored(model, reference: Reference) -> Reference:
     return replace(reference, joint_q=out)
 
 
-def mirrored_ball(ball: Ball) -> Ball:
-    """A ball in the mirror, with its contacts on the other hand."""
-    flights = tuple(Flight(f.release, f.catch, 1 - f.hand, 1 - f.next_hand) for f in ball.flights)
-    return replace(ball, path=ball.path * [1.0, -1.0, 1.0], touch=ball.touch[:, ::-1].copy(), flights=flights)
-
-
-def partner(model, joint: str) -> str:
+def partner(model: Model, joint: str) -> str:
     """The joint on the other side, or itself. Raises ValueError when there is none."""
     for side, other in (("l_", "r_"), ("r_", "l_")):
         if joint.startswith(side):

@@ -35,7 +35,7 @@ class Reference:
         """[s] from the first to the last row."""
         return (self.frame_count - 1) * self.timestep
 
-    def velocity(self, model) -> np.ndarray:
+    def velocity(self, model: Model) -> np.ndarray:
         """joint_qd (frames, nv) [m/s, rad/s] by differences to the next row (the last row keeps
         its own)."""
         if self.frame_count < 2:
@@ -57,7 +57,7 @@ class Cycle:
     gap: float = 0.0
     """[rad] root mean square over the model's joints of what had to be closed."""
 
-    def repeat(self, model, count: int) -> Reference:
+    def repeat(self, model: Model, count: int) -> Reference:
         """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count
         < 1."""
         if count < 1:
@@ -75,14 +75,14 @@ class Cycle:
         anchor = self.reference.joint_q[0, model.q_slice(model.root)][:2]
         return over_ground(poses, anchor, anchor + np.asarray(self.travel), self.turn)
 
-    def _carried(self, model) -> list[slice]:
+    def _carried(self, model: Model) -> list[slice]:
         """Where what is loose and goes along, as a dribbled ball, is in joint_q."""
         loose = [joint.q for joint in model.joints[1:] if joint.kind == "free"]
         first, last = self.reference.joint_q[:1], self.reference.joint_q[-1]
         goals = [self.ahead(model, first[:, part])[0] for part in loose]
         return [part for part, goal in zip(loose, goals) if np.linalg.norm(goal[:3] - last[part][:3]) < ALONG]
 
-    def _moved(self, joint_q, free: list[slice], number: int) -> np.ndarray:
+    def _moved(self, joint_q: np.ndarray, free: list[slice], number: int) -> np.ndarray:
         """Rows joint_q (n, nq) in the cycle of that number: the root and all that is loose, as the ball, are
         further on."""
         anchor = self.reference.joint_q[0, free[0]][:2]
@@ -95,7 +95,9 @@ class Cycle:
         return joint_q
 
 
-def close_cycle(model, reference: Reference, travel_above=0.25, turn_above=0.35) -> Cycle:
+def close_cycle(
+    model: Model, reference: Reference, travel_above: float = 0.25, turn_above: float = 0.35
+) -> Cycle:
     """Make the end of a reference lead back to its first row (P1 7.1).
 
     What is missing is blended in over the last BLEND seconds, at most half the clip. The way over
@@ -134,7 +136,7 @@ def closing(reference: Reference) -> tuple[np.ndarray, float]:
     return np.clip(1.0 - before / span, 0.0, 1.0)[:, None], span
 
 
-def _speed(model, reference: Reference, rows: slice) -> np.ndarray:
+def _speed(model: Model, reference: Reference, rows: slice) -> np.ndarray:
     """Mean velocity (nv,) over a few rows, which noise of single rows does not reach."""
     part = reference.joint_q[rows]
     return difference(model, part[:-1], part[1:]).mean(axis=0) / reference.timestep

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ..model import Model, gaps, pose
 from .mapping import Mapping
-from .planting import find_foot
+from .planting import Foot, find_foot
 from .reach import joint_range
 from .retarget import Retargeted
 
@@ -47,7 +47,7 @@ class Accuracy:
     """[rad] farthest that any joint is beyond its range."""
 
 
-def accuracy(model, result: Retargeted) -> Accuracy:
+def accuracy(model: Model, result: Retargeted) -> Accuracy:
     joint_q = result.reference.joint_q
     body_q = pose.forward(model, joint_q)
     errors = {
@@ -56,9 +56,9 @@ def accuracy(model, result: Retargeted) -> Accuracy:
     }
     limbs = {}
     for limb, bodies in _limbs(model, result.mapping).items():
-        part = [error for body, error in errors.items() if body in bodies]
-        if part:
-            limbs[limb] = (float(np.mean(part)), float(np.quantile(part, 0.95)))
+        apart = [error for body, error in errors.items() if body in bodies]
+        if apart:
+            limbs[limb] = (float(np.mean(apart)), float(np.quantile(apart, 0.95)))
     slides, strict, lows = [], [], []
     deepest, stood = 0.0, np.zeros(len(joint_q), bool)
     for name, stands in result.stands.items():
@@ -102,7 +102,7 @@ def _limbs(model: Model, mapping: Mapping) -> dict[str, set[str | None]]:
     return {limb: set(bodies) for limb, bodies in zip(LIMBS, [[model.roles.trunk, model.roles.head], *ends])}
 
 
-def sole_points(foot, body_q: np.ndarray) -> np.ndarray:
+def sole_points(foot: Foot, body_q: np.ndarray) -> np.ndarray:
     """Points of the sole (frames, 7, 3) [m]: corners of the foot's box, lowest points of the toes' ends, and
     the point under the toe joint, about which a foot pivots."""
     turn = Rotation.from_quat(body_q[:, foot.body, 3:])
@@ -113,7 +113,7 @@ def sole_points(foot, body_q: np.ndarray) -> np.ndarray:
     return np.stack(points, axis=1)
 
 
-def beyond_limits(model, joint_q: np.ndarray) -> float:
+def beyond_limits(model: Model, joint_q: np.ndarray) -> float:
     """[rad] farthest that any joint of joint_q (frames, nq) is beyond its range."""
     worst = 0.0
     for joint in model.joints:

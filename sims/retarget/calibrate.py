@@ -77,7 +77,7 @@ def shortest(start: np.ndarray, end: np.ndarray) -> Rotation:
     return Rotation.from_rotvec(axis * (np.arctan2(sine, start @ end) / sine))
 
 
-def rest_by_directions(model, motion: Motion, mapping: Mapping) -> Motion:
+def rest_by_directions(model: Model, motion: Motion, mapping: Mapping) -> Motion:
     """The motion with a T-pose built for it: every bone points where the model's does in its zero pose.
 
     For files whose pose at zero angles is no T-pose. The pelvis is turned by its hips and spine, the bones
@@ -106,14 +106,16 @@ def rest_by_directions(model, motion: Motion, mapping: Mapping) -> Motion:
     return replace(motion, rest_rotations=np.stack([r.as_quat() for r in rest]))
 
 
-def _hip_bodies(model, mapping: Mapping) -> list[str]:
+def _hip_bodies(model: Model, mapping: Mapping) -> list[str]:
     """The bodies of both thighs, the left one first."""
     upper = [pose.limb_bodies(model, knee)[0] for knee in mapping.legs]
     zero = model.zero_pose
     return [model.body_names[b] for b in sorted(upper, key=lambda b: -zero[b, 1])]
 
 
-def _directions(model, zero, motion: Motion, mapping: Mapping) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def _directions(
+    model: Model, zero: np.ndarray, motion: Motion, mapping: Mapping
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Joint -> (its bone in its own frame, the model's direction of it in the zero pose)."""
     wanted = {}
     for hinge, joints in mapping.limbs.items():
@@ -129,10 +131,10 @@ def _directions(model, zero, motion: Motion, mapping: Mapping) -> dict[int, tupl
                 wanted[foot] = (motion.offsets[toes[0]], zero[own[0]] - zero[bodies[2]])
         else:
             shoulder, clavicle = motion.index(joints[0]), int(model.body_parent[bodies[0]])
-            joint = mapping.bodies.get(model.body_names[clavicle])
-            if joint is not None and motion.parents[shoulder] == motion.index(joint):
+            named = mapping.bodies.get(model.body_names[clavicle])
+            if named is not None and motion.parents[shoulder] == motion.index(named):
                 line = zero[bodies[0]] - zero[clavicle]
-                wanted[motion.index(joint)] = (motion.offsets[shoulder], line)
+                wanted[motion.index(named)] = (motion.offsets[shoulder], line)
     for joint in _trunk(model, motion, mapping):
         if motion.parents[joint] > 0:
             wanted[int(motion.parents[joint])] = (motion.offsets[joint], np.array([0.0, 0.0, 1.0]))

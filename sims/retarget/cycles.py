@@ -85,7 +85,7 @@ def find_cycles(
     return [_candidate(places, speed, heading, root, one, step, rate) for one in kept]
 
 
-def seen_from_person(motion: Motion, mapping: Mapping):
+def seen_from_person(motion: Motion, mapping: Mapping) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (frames, joints, 3) [m] of the mapping's joints without position and heading, the heading
     (frames,) [rad], the root (frames, 2) [m] over the ground."""
     at = motion.positions if motion.positions is not None else motion.forward()[0]
@@ -114,7 +114,15 @@ def _minima(apart: np.ndarray, low: int) -> list[tuple[int, int]]:
     return [(int(i), int(k)) for i, k in np.argwhere(least & np.isfinite(apart))]
 
 
-def _candidate(places, speed, heading, root, one, step: int, rate: float) -> Candidate:
+def _candidate(
+    places: np.ndarray,
+    speed: np.ndarray,
+    heading: np.ndarray,
+    root: np.ndarray,
+    one: tuple[float, int, int, float],
+    step: int,
+    rate: float,
+) -> Candidate:
     _, i, j, out = one
     first, last = i * step, min(j * step, len(heading) - 1)
     return Candidate(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from ...assets import path as asset
+from ..model import Model
 from ..recording.motion import Motion
 
 SHIPPED = ("cmu", "ballplay", "mixamo", "lafan")
@@ -72,7 +73,7 @@ class Mapping:
         names = {n.removeprefix(self.prefix) for n in motion.joint_names}
         return names >= set(self.joints())
 
-    def check_model(self, model) -> None:
+    def check_model(self, model: Model) -> None:
         """Raise MappingError for a body or hinge that the model does not have, or a hand without knuckles."""
         for table, there in (
             ("bodies", model.body_names),
@@ -122,7 +123,7 @@ def parse_mapping(text: str, name: str) -> Mapping:
     for key in data:
         if key not in known:
             raise MappingError(f"{name}: {key}: unknown key; there are {', '.join(sorted(known))}")
-    out: dict = {"name": name}
+    out: dict[str, Any] = {"name": name}
     for key in ("bodies", "arms", "legs"):
         if not data.get(key):
             raise MappingError(f"{name}: {key}: missing")
@@ -165,7 +166,7 @@ def _bones_along_x(motion: Motion) -> bool:
     return float((directions @ directions[0]).min()) > 0.98
 
 
-def _entry(name: str, table: str, key: str, value):
+def _entry(name: str, table: str, key: str, value: Any) -> Any:
     place = f"{table}.{key}"
     if table == "smoothed":
         number = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1e4

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter
 from scipy.spatial.transform import Rotation
 
-from ..model import gaps
+from ..model import Model, gaps
 from ..planar import wrapped
 from ..signals import runs, smoothstep
 
@@ -63,7 +63,7 @@ class Stand:
     """(rows,) [rad], positive with the heel up, negative with the toes up."""
 
 
-def find_foot(model, body: str) -> Foot:
+def find_foot(model: Model, body: str) -> Foot:
     """The sole of a foot body. Raises ValueError when no toes hang from it or it has no shape."""
     zero = model.zero_pose[None]
     foot = model.body(body)
@@ -139,12 +139,15 @@ def standing_foot(foot: Foot, stand: Stand) -> tuple[np.ndarray, Rotation]:
     return ankle, turn
 
 
-def planted(foot: Foot, ankle: np.ndarray, turn: Rotation, stands: list[Stand]):
+def planted(
+    foot: Foot, ankle: np.ndarray, turn: Rotation, stands: list[Stand]
+) -> tuple[np.ndarray, Rotation, np.ndarray]:
     """The foot's path with its stands: ankle (frames, 3) [m], rotation (frames,), toe joint angle (frames,)
     [rad]. Toes are flat while the foot stands and bend back between."""
     frames = len(ankle)
     place, quat, toes = ankle.copy(), turn.as_quat(), np.zeros(frames)
-    known, moved, turned = [], [], []
+    known: list[int] = []
+    moved, turned = [], []
     for stand in stands:
         part = slice(stand.first, stand.last + 1)
         place[part], now = standing_foot(foot, stand)
@@ -181,7 +184,7 @@ def heading(turn: Rotation) -> tuple[np.ndarray, np.ndarray]:
     return np.arctan2(forward[:, 1], forward[:, 0]), np.arcsin(np.clip(-forward[:, 2], -1.0, 1.0))
 
 
-def _touching(foot: Foot, ankle, turn: Rotation, timestep: float) -> np.ndarray:
+def _touching(foot: Foot, ankle: np.ndarray, turn: Rotation, timestep: float) -> np.ndarray:
     """(2, frames) bool: the heel touches, the ball of the foot touches."""
     heights = sole_heights(foot, ankle, turn)
     window = max(3, round(SHORTEST / timestep))

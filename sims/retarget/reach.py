@@ -22,7 +22,14 @@ LARGEST = 0.12
 """[m] by which the root is lowered at most."""
 
 
-def reach(model, joint_q: np.ndarray, hinge: str, end: np.ndarray, turn: Rotation, axis=None) -> None:
+def reach(
+    model: Model,
+    joint_q: np.ndarray,
+    hinge: str,
+    end: np.ndarray,
+    turn: Rotation,
+    axis: np.ndarray | None = None,
+) -> None:
     """Bend a limb of joint_q (frames, nq) in place so that its far body comes to `end` (frames, 3) [m]
     with rotation `turn`; the hinge keeps its direction in the world, or takes `axis` (frames, 3)."""
     upper, lower, last = pose.limb_bodies(model, hinge)
@@ -38,7 +45,9 @@ def reach(model, joint_q: np.ndarray, hinge: str, end: np.ndarray, turn: Rotatio
     keep_range(model, joint_q, wrist)
 
 
-def lift_out(model, joint_q: np.ndarray, hinge: str, end: np.ndarray | None, bodies: list[int]) -> None:
+def lift_out(
+    model: Model, joint_q: np.ndarray, hinge: str, end: np.ndarray | None, bodies: list[int]
+) -> None:
     """Raise the end of a limb, in place, by as much as its bodies are below the ground: from `end` (frames,
     3) [m], or from where it is."""
     last = pose.limb_bodies(model, hinge)[2]
@@ -50,7 +59,7 @@ def lift_out(model, joint_q: np.ndarray, hinge: str, end: np.ndarray | None, bod
         reach(model, joint_q, hinge, end, Rotation.from_quat(body_q[:, last, 3:]))
 
 
-def lower_root(model, joint_q: np.ndarray, legs: dict[str, np.ndarray]) -> np.ndarray:
+def lower_root(model: Model, joint_q: np.ndarray, legs: dict[str, np.ndarray]) -> np.ndarray:
     """Lower the root in place until every leg reaches; legs: knee hinge -> ankle goal (frames, 3) [m].
 
     Returns by how much (frames,) [m], eased in and out.
@@ -73,7 +82,7 @@ def lower_root(model, joint_q: np.ndarray, legs: dict[str, np.ndarray]) -> np.nd
     return eased
 
 
-def shrug(model, joint_q: np.ndarray, upper: int, goal: np.ndarray) -> None:
+def shrug(model: Model, joint_q: np.ndarray, upper: int, goal: np.ndarray) -> None:
     """Turn the body before an upper arm, in place, so that the shoulder comes nearer to goal (frames, 3)
     [m]; by SHRUG at most."""
     clavicle = int(model.body_parent[upper])
@@ -92,7 +101,9 @@ def shrug(model, joint_q: np.ndarray, upper: int, goal: np.ndarray) -> None:
     keep_range(model, joint_q, joint)
 
 
-def elbow_axis(model, joint_q: np.ndarray, hinge: str, elbow: np.ndarray, wrist: np.ndarray) -> np.ndarray:
+def elbow_axis(
+    model: Model, joint_q: np.ndarray, hinge: str, elbow: np.ndarray, wrist: np.ndarray
+) -> np.ndarray:
     """Where the hinge's axis (frames, 3) should point for the elbow to come nearest to its goal (frames, 3)
     [m] with the wrist on its own; a nearly straight arm keeps the axis it has."""
     upper, lower, _ = pose.limb_bodies(model, hinge)
@@ -114,7 +125,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
-def keep_range(model, joint_q: np.ndarray, joint: str) -> None:
+def keep_range(model: Model, joint_q: np.ndarray, joint: str) -> None:
     """Bring one joint of joint_q (frames, nq) into its range, in place."""
     own = model.joints[model.joint(joint)]
     low, high = joint_range(own)

@@ -47,12 +47,12 @@ class Retargeted:
     """(frames,) [m] by which the root went down for the legs to reach."""
 
 
-def retarget(model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Reference:
+def retarget(model: Model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Reference:
     """The motion on the model at the model's time step; see `retargeted`."""
     return retargeted(model, motion, mapping, ik).reference
 
 
-def retargeted(model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Retargeted:
+def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Retargeted:
     """The motion on the model, resampled to a whole number of its steps, the ground at z = 0.
 
     mapping: None takes the shipped one that fits. ik: False copies rotations only. Bodies the mapping does
@@ -82,7 +82,7 @@ def retargeted(model, motion: Motion, mapping: Mapping | None = None, ik: bool =
     return _with_ik(model, out, feet, knees) if ik else out
 
 
-def goal_joints(model, mapping: Mapping) -> dict[str, str]:
+def goal_joints(model: Model, mapping: Mapping) -> dict[str, str]:
     """Body of the model -> joint of the recording that lies at its origin."""
     named = dict(mapping.points)
     for hinge, joints in mapping.limbs.items():
@@ -90,16 +90,16 @@ def goal_joints(model, mapping: Mapping) -> dict[str, str]:
     return named
 
 
-def leg_scale(model, motion: Motion, mapping: Mapping) -> float:
+def leg_scale(model: Model, motion: Motion, mapping: Mapping) -> float:
     """[-] length of the model's legs over the recorded person's."""
     zero = model.zero_pose[:, :3]
     own = theirs = 0.0
     for knee, joints in mapping.legs.items():
         bodies = pose.limb_bodies(model, knee)
         for (a, b), joint in zip(pairwise(bodies), joints[1:]):
-            own += np.linalg.norm(zero[b] - zero[a])
-            theirs += np.linalg.norm(motion.offsets[motion.index(joint)])
-    return float(own / theirs)
+            own += float(np.linalg.norm(zero[b] - zero[a]))
+            theirs += float(np.linalg.norm(motion.offsets[motion.index(joint)]))
+    return own / theirs
 
 
 def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[str, str]) -> Retargeted:
@@ -128,7 +128,15 @@ def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[s
     return Retargeted(out.reference, out.mapping, out.scale, out.goals, out.ground, stands, lowered)
 
 
-def _place_foot(model, joint_q: np.ndarray, foot: Foot, knee: str, place, turn: Rotation, toes) -> None:
+def _place_foot(
+    model: Model,
+    joint_q: np.ndarray,
+    foot: Foot,
+    knee: str,
+    place: np.ndarray,
+    turn: Rotation,
+    toes: np.ndarray,
+) -> None:
     """Bring a leg to its foot's path, in place; a foot that the ankle's range turns into the ground goes
     that much higher."""
     joint_q[:, model.q_slice(foot.toe_joint)] = toes[:, None]
@@ -137,15 +145,17 @@ def _place_foot(model, joint_q: np.ndarray, foot: Foot, knee: str, place, turn: 
     lift_out(model, joint_q, knee, place, [foot.body, foot.toes])
 
 
-def _ground(model, joint_q: np.ndarray, goals, feet) -> np.ndarray:
+def _ground(
+    model: Model, joint_q: np.ndarray, goals: dict[str, np.ndarray], feet: dict[str, Foot]
+) -> np.ndarray:
     """Height (frames,) [m] of the ground under the recording: constant where the clip is short, else
     following what the soles come down to, of our feet on the recording's ankles."""
     body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
-    low = []
+    heights = []
     for name, foot in feet.items():
         turn = Rotation.from_quat(body_q[:, foot.body, 3:])
-        low.append(sole_heights(foot, goals[name], turn).min(axis=1))
-    low = gaussian_filter1d(np.min(low, axis=0), 0.03 / model.timestep, mode="nearest")
+        heights.append(sole_heights(foot, goals[name], turn).min(axis=1))
+    low = gaussian_filter1d(np.min(heights, axis=0), 0.03 / model.timestep, mode="nearest")
     rows = round(GROUND[0] / model.timestep)
     ground = minimum_filter1d(low, min(rows, len(low)), mode="nearest")
     return gaussian_filter1d(ground, GROUND[1] / model.timestep, mode="nearest")
@@ -171,7 +181,7 @@ def _body_rotations(
     return turned
 
 
-def _palm(model, hand: str, places) -> Rotation:
+def _palm(model: Model, hand: str, places: list[np.ndarray]) -> Rotation:
     """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]."""
     knuckles = model.roles.knuckles[model.roles.hands.index(hand)]
     own = [model.zero_pose[model.body(name), :3] for name in (hand, *knuckles)]
@@ -180,7 +190,7 @@ def _palm(model, hand: str, places) -> Rotation:
     return now * pose.frame_of(own[2] - own[0], own[1] - own[3]).inv()
 
 
-def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> None:
+def _fill_joints(model: Model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> None:
     """Joint coordinates of the bodies in `turned`, in place; hinges take the angle nearest to the copied
     rotation, all stay within their range.
 
@@ -202,7 +212,9 @@ def _fill_joints(model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> Non
         keep_range(model, joint_q, joint)
 
 
-def _root(model, goals, mapping: Mapping, turned) -> np.ndarray:
+def _root(
+    model: Model, goals: dict[str, np.ndarray], mapping: Mapping, turned: dict[str, Rotation]
+) -> np.ndarray:
     """Root poses (frames, 7): the middle of the hips is where the scaled recording has it."""
     zero = model.zero_pose
     hips = [pose.limb_bodies(model, knee)[0] for knee in mapping.legs]

@@ -9,10 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from ..clips import ClipError, data_folder
-from ..sims.ball.ball import Ball, ball_path, find_checkpoints, flights_of, inferred_ball, recorded_ball
+from ..sims.ball.ball import (
+    Ball,
+    ball_path,
+    find_checkpoints,
+    flights_of,
+    inferred_ball,
+    mirrored_ball,
+    recorded_ball,
+)
 from ..sims.ball.hands import find_hands
 from ..sims.model import Model
-from ..sims.reference.mirror import mirrored, mirrored_ball
+from ..sims.reference.mirror import mirrored
 from ..sims.reference.reference import Cycle, Reference, close_cycle, closing
 from ..sims.retarget.mapping import MappingError, find_mapping, read_mapping
 from ..sims.retarget.reach import lift_out

@@ -4,7 +4,13 @@ import pytest
 from warpdribble.clips.read import read_clip
 from warpdribble.sims import Model
 from warpdribble.sims.authored.catalogue import authored_clip
-from warpdribble.sims.ball.ball import find_checkpoints, flights_of, inferred_ball, recorded_ball
+from warpdribble.sims.ball.ball import (
+    find_checkpoints,
+    flights_of,
+    inferred_ball,
+    mirrored_ball,
+    recorded_ball,
+)
 from warpdribble.sims.ball.contact_score import score_contacts
 from warpdribble.sims.ball.flight import Bounce, speed_to_meet, speed_to_return, thrown
 from warpdribble.sims.reference.reference import Cycle
@@ -136,3 +142,10 @@ def test_scores_add_up():
     assert far.precision < 0.2 and (one + far).inferred == 60
     nothing = score_contacts(np.zeros(100, bool), a, 0.01)
     assert nothing.precision == 1.0 and nothing.recall == 0.0 and nothing.missed == 2
+
+
+def test_the_ball_changes_hands(player):
+    ball = authored_clip(player, "dribble_right").ball
+    twin = mirrored_ball(ball)
+    assert np.array_equal(twin.touch[:, 0], ball.touch[:, 1]) and not twin.touch[:, 1].any()
+    assert np.allclose(twin.path[:, 1], -ball.path[:, 1])

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from warpdribble.sims import Model
-from warpdribble.sims.authored.catalogue import authored_clip
 from warpdribble.sims.model import pose
-from warpdribble.sims.reference.mirror import mirrored, mirrored_ball, partner
+from warpdribble.sims.reference.mirror import mirrored, partner
 from warpdribble.sims.reference.reference import Reference, integrate
 
 
@@ -45,10 +44,3 @@ def test_a_joint_without_a_partner_is_named(player):
     assert partner(player, "neck") == "neck" and partner(player, "l_knee") == "r_knee"
     with pytest.raises(ValueError, match="'l_knee' has no partner 'r_knee'"):
         partner(Lame, "l_knee")
-
-
-def test_the_ball_changes_hands(player):
-    ball = authored_clip(player, "dribble_right").ball
-    twin = mirrored_ball(ball)
-    assert np.array_equal(twin.touch[:, 0], ball.touch[:, 1]) and not twin.touch[:, 1].any()
-    assert np.allclose(twin.path[:, 1], -ball.path[:, 1])
