@@ -1,4 +1,4 @@
-"""Files that ship with warpdribble: the player (MJCF), skills, authored clips, controllers."""
+"""Files that ship with warpdribble: the player (MJCF), skills, mappings, controllers, the replay."""
 
 from importlib.resources import files
 from pathlib import Path
