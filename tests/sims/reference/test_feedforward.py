@@ -67,9 +67,14 @@ def test_targets_of_a_pose_at_rest_differ_by_torque_over_stiffness(player, lean)
     targets = leading_targets(player, lean, FEET)
     apart = difference(player, lean.joint_q, targets)[50]
     torque = holding_torques(player, lean, FEET)[50]
-    driven = player.tables["dof_kp"] > 0.0
-    assert np.allclose((apart * player.tables["dof_kp"])[driven], torque[driven], atol=1e-6)
-    assert np.allclose(apart[~driven], 0.0)
+    driven = 0
+    for joint in player.joints:
+        if joint.driven:
+            assert np.allclose(joint.kp * apart[joint.dof], torque[joint.dof], atol=1e-6), joint.name
+            driven += 1
+        else:
+            assert np.allclose(apart[joint.dof], 0.0), joint.name
+    assert driven == 49 and np.abs(torque).max() > 10.0
 
 
 def test_targets_lead_a_steady_motion_by_damping_over_stiffness(player):
@@ -78,6 +83,5 @@ def test_targets_lead_a_steady_motion_by_damping_over_stiffness(player):
     times = player.timestep * np.arange(101)[:, None]
     joint_q = integrate(player, np.tile(player.start_q, (101, 1)), times * speed)
     targets = leading_targets(player, Reference(joint_q, player.timestep))
-    elbow, dof = player.q_slice("r_elbow"), player.dof_slice("r_elbow")
-    lead = (player.tables["dof_kd"][dof] / player.tables["dof_kp"][dof])[0]
-    assert np.allclose(targets[:, elbow] - joint_q[:, elbow], 0.5 * lead)
+    elbow = player.joints[player.joint("r_elbow")]
+    assert np.allclose((targets - joint_q)[:, elbow.q], 0.5 * elbow.kd / elbow.kp)
