@@ -49,7 +49,7 @@ class Joint:
     kd: float
     """[N m s/rad]"""
     effort: float
-    """[N m] largest torque of the drive."""
+    """[N m] largest torque of the drive, `mjcf.ANYWHERE` where it has no limit."""
     driven: bool
     armature: float
     """[kg m^2]"""
