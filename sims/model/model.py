@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...assets import path as asset
+from ..trees import below
 from .joints import DOF_SIZE, KINDS, Q_SIZE, Coordinates, Joint, Kind, coordinates
 from .load import read_model
 from .mjcf import ModelError, Shape
@@ -229,11 +230,7 @@ class Model:
 
     def descendants(self, body: int) -> list[int]:
         """A body and all bodies that hang from it, directly or not."""
-        found = [body]
-        for child, parent in enumerate(self.body_parent):
-            if parent in found:
-                found.append(child)
-        return found
+        return below(self.body_parent, body)
 
     def first_shape(self, body: int) -> Shape:
         """The shape of a body that the file names first. Raises ValueError when it has none."""

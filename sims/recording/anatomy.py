@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..trees import below
+
 PARTS = {
     "hip": ("upleg", "upperleg", "thigh", "femur", "hip"),
     "knee": ("leg", "lowerleg", "shin", "calf", "tibia", "knee"),
@@ -38,7 +40,7 @@ def parts(names: Sequence[str], parents: np.ndarray) -> dict[str, int]:
         if f"{side}_wrist" in found:
             found[f"{side}_hand"] = _finger_tip(names, parents, found[f"{side}_wrist"])
         if f"{side}_toe" in found:
-            found[f"{side}_toe_tip"] = _below(parents, found[f"{side}_toe"])[-1]
+            found[f"{side}_toe_tip"] = below(parents, found[f"{side}_toe"])[-1]
     if ("", "head") in plain:
         found["head"] = plain.index(("", "head"))
     return found
@@ -72,20 +74,11 @@ def _plain(name: str) -> tuple[str, str]:
     return "", word
 
 
-def _below(parents: np.ndarray, joint: int) -> list[int]:
-    """A joint and all joints that hang from it."""
-    found = [joint]
-    for child in range(joint + 1, len(parents)):
-        if parents[child] in found:
-            found.append(child)
-    return found
-
-
 def _finger_tip(names: Sequence[str], parents: np.ndarray, wrist: int) -> int:
     """The end of the middle finger, else of the index finger, else of any that is no thumb."""
-    below = _below(parents, wrist)
+    hand = below(parents, wrist)
     for word in ("middle", "index", ""):
-        chain = [j for j in below if word in names[j].lower() and "thumb" not in names[j].lower()]
+        chain = [j for j in hand if word in names[j].lower() and "thumb" not in names[j].lower()]
         if chain:
             return chain[-1]
     return wrist

@@ -53,11 +53,6 @@ def watched(motion: Motion) -> list[int]:
     return sorted({0, *(j for part, j in found.items() if not part.endswith("_hand"))})
 
 
-def places(motion: Motion) -> np.ndarray:
-    """Joint origins (frames, joints, 3) [m]: as recorded where the format has them."""
-    return motion.forward()[0] if motion.positions is None else motion.positions
-
-
 def odd_steps(steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How far each step (frames - 1, joints, 3) is from the median of those around it, and the usual
     distance there: two arrays (frames - 1, joints)."""
@@ -75,7 +70,7 @@ def jumps(motion: Motion) -> list[Event]:
     """Sudden changes of place; frame f is the first at the new place. Joints that jump together are one
     event, and so are jumps less than 0.05 s apart."""
     joints = watched(motion)
-    apart, unrest = odd_steps(np.diff(places(motion)[:, joints], axis=0))
+    apart, unrest = odd_steps(np.diff(motion.places()[:, joints], axis=0))
     limit = np.maximum(JUMP_SPEED, JUMP_RATIO * (unrest * motion.rate + UNREST)) / motion.rate
     broken = apart > limit
     events = []

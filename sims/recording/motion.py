@@ -130,6 +130,10 @@ class Motion:
         joints, 4) xyzw."""
         return _forward(self.parents, self.offsets, self.rotations, self.root_position)
 
+    def places(self) -> np.ndarray:
+        """Joint origins (frames, joints, 3) [m]: as recorded where the format has them."""
+        return self.forward()[0] if self.positions is None else self.positions
+
     def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """Forward kinematics of the rest pose, root at the origin: (joints, 3) [m], (joints, 4)."""
         positions, frames = _forward(self.parents, self.offsets, self.rest_rotations[None], np.zeros((1, 3)))

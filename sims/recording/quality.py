@@ -90,7 +90,7 @@ def _root_speed(motion: Motion) -> np.ndarray:
 
 def _hands(motion: Motion, ground: float, first_frame: int) -> dict[str, Hand]:
     found = anatomy.parts(motion.joint_names, motion.parents)
-    where = defects.places(motion)
+    where = motion.places()
     hands = {}
     for side in anatomy.SIDES:
         if f"{side}_hand" not in found:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..signals import runs, speed
 from . import anatomy
-from .defects import Event, places
+from .defects import Event
 from .motion import Motion
 
 SLOW = 0.5
@@ -38,7 +38,7 @@ def stance(motion: Motion) -> tuple[dict[str, Foot], float, list[Event]]:
     toes, with BallPlay-M the toe joint, a few centimetres above the sole. NaN where no foot ever stands.
     """
     found = anatomy.parts(motion.joint_names, motion.parents)
-    where = places(motion)
+    where = motion.places()
     feet, lowest, ground = {}, {}, []
     for side in anatomy.SIDES:
         names = (f"{side}_ankle", f"{side}_toe", f"{side}_toe_tip")

@@ -88,7 +88,7 @@ def find_cycles(
 def seen_from_person(motion: Motion, mapping: Mapping) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (frames, joints, 3) [m] of the mapping's joints without position and heading, the heading
     (frames,) [rad], the root (frames, 2) [m] over the ground."""
-    at = motion.positions if motion.positions is not None else motion.forward()[0]
+    at = motion.places()
     hips = [at[:, motion.index(joints[0])] for joints in mapping.legs.values()]
     across = hips[0] - hips[1]
     heading = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
