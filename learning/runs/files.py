@@ -64,9 +64,10 @@ def mapped(path: Path, shape: tuple[int, ...], dtype: Any = np.float32) -> np.nd
     """A file as an array, made where there is none: for what would be too large to write with every
     checkpoint. A checkpoint says how much of it counts; what was written later is written again."""
     if path.exists():
-        array = np.lib.format.open_memmap(path, mode="r+")
+        with said_if_damaged(path, "learn again", "out"):
+            array = np.lib.format.open_memmap(path, mode="r+")
         if array.shape != shape or array.dtype != dtype:
-            raise InputError(f"has {array.shape} numbers, not {shape}", path, "out")
+            raise InputError(f"has {array.shape} {array.dtype}, not {shape} {np.dtype(dtype)}", path, "out")
         return array
     return np.lib.format.open_memmap(path, mode="w+", dtype=dtype, shape=shape)
 

@@ -31,7 +31,7 @@ from ..graph import ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
 from ..tasks.locomotion import Locomotion
-from .files import LOCK, read_arrays, said_if_damaged, write_arrays, write_json
+from .files import LOCK, held, read_arrays, said_if_damaged, write_arrays, write_json
 from .log import Log
 from .stage import Arrays, Context, Learner, Stage
 
@@ -62,7 +62,6 @@ class Run:
             raise InputError(f"holds another run: {apart[0]}", folder, "out")
         try:
             check_folder(folder)
-            sweep(folder)
         except OSError as error:
             raise InputError(f"cannot be written: {error.strerror or error}", folder, "out") from None
         return Run(folder, stored or info)
@@ -90,15 +89,18 @@ class Run:
         return (self.folder / GRAPH).exists()
 
     def keep(self, skill_text: str, make: Callable[[], ControlGraph]) -> None:
-        """Make the graph and keep it with the skill's file, where the run is new."""
+        """Make the graph and keep it with the skill's file, where the run is new. Raises InputError for a
+        folder that another process holds."""
         if self.begun:
             return
-        graph = make()
-        write_json(self.folder / RUN, self.info)
-        with whole(self.folder / SKILL) as part:
-            part.write_text(skill_text, encoding="utf-8")
-        with whole(self.folder / GRAPH) as part:
-            graph.save(part)
+        with held(self.folder):
+            sweep(self.folder)
+            graph = make()
+            write_json(self.folder / RUN, self.info)
+            with whole(self.folder / SKILL) as part:
+                part.write_text(skill_text, encoding="utf-8")
+            with whole(self.folder / GRAPH) as part:
+                graph.save(part)
 
     @property
     def graph(self) -> ControlGraph:
@@ -110,8 +112,12 @@ class Run:
 
     def context(self, stage: Stage, config: Any, device: str = "cpu", workers: int = 1) -> Context:
         """For a learner of a stage. Raises InputError where a stage that it needs has not been learned."""
-        folder = self.folder / stage.name
-        needs = {need: read_result(self.folder / need) for need in stage.needs}
+        folder, needs = self.folder / stage.name, {}
+        for need in stage.needs:
+            if not (self.folder / need / RESULT).exists():
+                reason = f"{stage.name} starts from what {need} has learned, and there is nothing yet"
+                raise InputError(reason, self.folder, "needs")
+            needs[need] = read_result(self.folder / need)
         return Context(self.graph, config, self.seed, device, workers, folder, needs)
 
     def learned(self, stages: Mapping[str, Stage], name: str = "") -> Learned:
@@ -119,9 +125,10 @@ class Run:
         has."""
         there = [s for s in stages if (self.folder / s / CONFIG).exists()]
         if name and name not in stages:
-            raise InputError(f"there is no stage '{name}'; there are {', '.join(stages)}", self.folder)
+            reason = f"there is no stage '{name}'; there are {', '.join(stages)}"
+            raise InputError(reason, self.folder, "stage")
         if not there or (name and name not in there):
-            raise InputError(f"has no policy yet, {name or 'nothing'} was learned", self.folder, "learn")
+            raise InputError(f"has no policy yet: no {name or 'stage'} was learned", self.folder, "learn")
         done = [s for s in there if (self.folder / s / RESULT).exists()]
         stage = stages[name or (done or there)[-1]]
         folder = self.stage(stage)
@@ -176,32 +183,31 @@ class StageFolder:
         """The stage's parameters: those asked for, else those it was begun with, else its defaults; keys
         that an older file lacks have their defaults. iterations: in all; None for what it was begun with.
         Raises InputError where others were asked for than it was begun with."""
-        default = asked if asked is not None else self.stage.config()
         stored = self._stored()
-        if stored is None:
-            config = default
+        if asked is None:
+            config = self.stage.config() if stored is None else stored
+        elif stored is None:
+            config = asked
         else:
-            config = filled(default, stored) if asked is None else default
-            apart = differences(plain(filled(self.stage.config(), stored)), plain(config))
-            if apart:
+            if apart := differences(plain(stored), plain(asked)):
                 raise InputError(f"holds another run: {apart[0]}", self.path, "out")
-            config = replace(config, iterations=stored["iterations"])
+            config = replace(asked, iterations=stored.iterations)
         return config if iterations is None else replace(config, iterations=iterations)
 
-    def _stored(self) -> dict[str, Any] | None:
+    def _stored(self) -> Any:
         path = self.path / CONFIG
         if not path.exists():
             return None
         with said_if_damaged(path, "put it right, or learn again", "out"):
-            config = json.loads(path.read_text(encoding="utf-8"))
-            if type(config["iterations"]) is not int:
-                raise ValueError("iterations is no whole number")
-            return dict(config)
+            return filled(self.stage.config(), json.loads(path.read_text(encoding="utf-8")))
 
-    def begin(self, config: Any) -> None:
-        """Make the folder, and keep the parameters."""
+    def make(self) -> None:
+        """Make the folder, without what killed writers have left in it. Only for who holds the run."""
         self.path.mkdir(exist_ok=True)
         sweep(self.path)
+
+    def begin(self, config: Any) -> None:
+        """Keep the parameters."""
         write_json(self.path / CONFIG, plain(config))
 
     def restore(self, learner: Learner) -> float:
@@ -236,8 +242,7 @@ def read_result(folder: Path) -> Arrays:
     """The best that a stage has found so far. Raises InputError where there is none yet."""
     path = folder / RESULT
     if not path.exists():
-        reason = "has no policy yet: let it go on with the same warpdribble learn"
-        raise InputError(reason, folder.parent)
+        raise InputError("has no policy yet", folder.parent, "go on")
     return read_arrays(path, RESULT_REMEDY)
 
 
@@ -255,17 +260,31 @@ def plain(config: Any) -> dict[str, Any]:
     return dict(json.loads(json.dumps(asdict(config))))
 
 
-def filled(default: Any, stored: Mapping[str, Any]) -> Any:
+def filled(default: Any, stored: Any, name: str = "it") -> Any:
     """A dataclass like `default` with the values of a stored table; what the table lacks keeps its default.
-    Raises TypeError for keys that are none."""
+    Raises TypeError for keys that are none, and for values of another kind."""
+    if not is_dataclass(default):
+        return _alike(default, stored, name)
+    if not isinstance(stored, Mapping):
+        raise TypeError(f"{name} is no table")
     known = {f.name for f in fields(default)}
     if unknown := set(stored) - known:
         raise TypeError(f"unknown key '{sorted(unknown)[0]}'")
-    values = {
-        name: filled(getattr(default, name), value) if is_dataclass(getattr(default, name)) else value
-        for name, value in stored.items()
-    }
-    return replace(default, **values)
+    values = {key: filled(getattr(default, key), value, key) for key, value in stored.items()}
+    return replace(default, **values)  # type: ignore[type-var]
+
+
+def _alike(default: Any, value: Any, name: str) -> Any:
+    """A value as JSON has it for a field with a default."""
+    if isinstance(default, tuple):
+        value = tuple(value) if isinstance(value, list) else value
+    kind = type(default)
+    if kind is float:
+        value = float(value) if type(value) is int else value
+    if default is not None and type(value) is not kind:
+        said = {int: "whole number", float: "number", bool: "true or false", str: "text"}
+        raise TypeError(f"{name} is no {said.get(kind, kind.__name__)}")
+    return value
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:

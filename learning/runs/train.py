@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from ...sims.files import sweep
 from .files import held
 from .folder import SECONDS, Run, StageFolder
-from .log import Log
+from .log import Log, read_rows
 from .stage import Learner, Report, Stage
 
 
@@ -21,7 +22,7 @@ class Trained:
     iterations: int
     """in the checkpoint"""
     has_events: bool
-    """TensorBoard's files were written too."""
+    """TensorBoard's files are there too."""
 
 
 def train(
@@ -42,11 +43,14 @@ def train(
     folder = run.stage(stage)
     with held(run.folder):
         config = folder.config(config, iterations)
-        learner = stage.make(run.context(stage, config, device, workers))
+        context = run.context(stage, config, device, workers)
+        sweep(run.folder)
+        folder.make()
+        learner = stage.make(context)
         seconds = folder.restore(learner)
         if made:
             made(learner, config)
-        folder.begin(config)
+        folder.begin(replace(config, iterations=max(config.iterations, learner.iteration)))
         return _train(folder, stage, learner, seconds, progress)
 
 
@@ -60,12 +64,14 @@ def _train(
     began = time.perf_counter() - seconds
     state, at, saved, when = learner.state, learner.iteration, learner.iteration, time.perf_counter()
     log: Log | None = None
+    if learner.done and (rows := read_rows(folder.path)):
+        log = folder.log(list(rows[0]), at)  # for TensorBoard, if its package came later
     try:
         while not learner.done:
             report = learner.iterate()
             state, at, seconds = learner.state, learner.iteration, time.perf_counter() - began
             names = [f.name for f in fields(report) if f.name != "fresh"]
-            log = log or folder.log([*names, SECONDS], learner.iteration - 1)
+            log = log or folder.log([*names, SECONDS], at - 1)
             log.add({name: getattr(report, name) for name in names} | {SECONDS: seconds})
             if report.fresh and (result := learner.result) is not None:
                 folder.save_result(result, learner.iteration)
@@ -82,4 +88,4 @@ def _train(
         if log is not None:
             with contextlib.suppress(OSError):
                 log.close()
-    return Trained(saved, log is not None and log.has_events)
+    return Trained(saved, log is None or log.has_events)
