@@ -85,7 +85,7 @@ class Simulation(Batch):
         """Live memory `(world_count, n)` of joint_q, joint_qd, joint_target_q or joint_f: it shows what the
         worlds have, and what is written to it they have, on every device and at every lane count. From the
         first call on, each step costs the two copies that this takes; one lane has none, as its worlds lie
-        like that anyway."""
+        like that anyway. To open joint_target_q is to set targets: a reset leaves them alone from then on."""
         if name not in PORTS:
             raise ValueError(f"no port {name!r}; there are {', '.join(PORTS)}")
         lanes = getattr(self._world, PORTS[name])
@@ -156,7 +156,10 @@ class Simulation(Batch):
 
     def place(self, pool: State, rows: Any = None) -> None:
         """Put worlds into states of a pool, in one launch: each into its row of `rows` (world_count,), -1
-        leaves a world alone; by default world k into state k. Targets, forces and parameters stay."""
+        leaves a world alone; by default world k into state k. Targets, forces and parameters stay. Raises
+        ValueError for states of another model."""
+        if apart := pool.layout.unlike(self._layout):
+            raise ValueError(f"the pool's states are of another model: {apart[0]} differs in size")
         if rows is None:
             if len(pool) != self.world_count:
                 raise ValueError(f"the pool has {len(pool)} states for {self.world_count} worlds: give rows")

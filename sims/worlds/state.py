@@ -59,6 +59,11 @@ class Layout:
             start += n * parts
         return Layout(count, width * count, blocks)
 
+    def unlike(self, other: Layout) -> list[str]:
+        """Quantities that two layouts have in different sizes."""
+        both = [(name, b, other.blocks[name]) for name, b in self.blocks.items() if name in other.blocks]
+        return [name for name, a, b in both if (a.n, a.parts) != (b.n, b.parts)]
+
 
 class State:
     """States of `count` worlds, by name: `joint_q`, `joint_qd`, contact history, status.
@@ -128,5 +133,6 @@ class State:
 def _plain(values: dict[str, np.ndarray], device: Any) -> State:
     count = len(next(iter(values.values())))
     counts = {name: (v.shape[1], v.shape[2] if v.ndim == 3 else 1) for name, v in values.items()}
-    rows = np.concatenate([v.reshape(count, -1) for v in values.values()], axis=1).astype(np.float32).ravel()
+    flat = [v.reshape(count, n * parts) for v, (n, parts) in zip(values.values(), counts.values())]
+    rows = np.concatenate(flat, axis=1).astype(np.float32).ravel()
     return State(wp.array(rows, dtype=float, device=device), Layout.plain(count, counts))

@@ -5,15 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpdribble.sims import Model, Simulation
+from tests.sims.worlds.scene import WORLDS, carried, spare, varied
+from warpdribble.sims import Simulation
 from warpdribble.sims.worlds.batch import Batch
 from warpdribble.sims.worlds.simulation import FALL, NONFINITE, OVERSPEED
 
 
 @pytest.mark.parametrize("lanes", [1, 16])
-def test_a_copy_goes_on_as_its_source(lanes):
+def test_a_copy_goes_on_as_its_source(player, lanes):
     """Bit for bit, contact history included, wherever in the batch it lies."""
-    model = Model.load("player")
+    model = player
     random = np.random.default_rng(0)
     sim = Simulation(model, 20, lanes=lanes)
     start = np.tile(model.keyframes["hold"], (20, 1))
@@ -37,48 +38,12 @@ def test_a_copy_goes_on_as_its_source(lanes):
     np.testing.assert_array_equal(sim.joint_q, alone.joint_q[sources])
 
 
-def test_sources_are_checked():
-    sim = Simulation(Model.load("player"), 2)
+def test_sources_are_checked(player):
+    sim = Simulation(player, 2)
     with pytest.raises(ValueError, match="sources must have shape"):
         sim.copy_worlds([0])
     with pytest.raises(IndexError, match="worlds must lie in"):
         sim.copy_worlds([0, 2])
-
-
-CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
-WORLDS = 37  # three groups of 16, the last one not full
-
-
-def carried(sim):
-    """All that a step hands to the next, by name, a row per world."""
-    return {name: sim._read(getattr(sim._world, name)) for name in CARRIED}
-
-
-def varied(model, lanes=None, threads=None):
-    """Worlds that differ in state, contacts, status, targets, mass and force."""
-    random = np.random.default_rng(2)
-    sim = Simulation(model, WORLDS, lanes=lanes, threads=threads)
-    q = np.tile(model.keyframes["hold"], (WORLDS, 1))
-    q[:, 2] += random.uniform(0, 0.02, WORLDS)
-    q[::5, 2] -= 0.5  # these fall
-    q[3, model.q_slice("l_elbow")] = 1.0
-    targets = q.copy()
-    targets[:, model.q_slice("r_elbow")] += random.uniform(-0.5, 0.5, (WORLDS, 1))
-    sim.set_targets(targets)
-    sim.set_mass("ball", random.uniform(0.4, 0.8, WORLDS))
-    sim.apply_force("torso", random.uniform(-20, 20, (WORLDS, 3)))
-    qd = np.zeros((WORLDS, model.nv))
-    qd[7, model.dof_slice("l_elbow")] = 1e4  # faster than joints may turn
-    sim.reset(joint_q=q, joint_qd=qd)
-    sim.step(10)
-    sim._write("q", np.array([11]), np.array([np.nan]), column=0)
-    sim.step(1)
-    return sim
-
-
-@pytest.fixture(scope="module")
-def player():
-    return Model.load("player")
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +57,8 @@ def check(sim, sources):
     sim.copy_worlds(sources)
     for name, rows in carried(sim).items():
         np.testing.assert_array_equal(rows, before[name][sources], err_msg=name)
-    lanes = sim._rows(sim._world.q)[..., 0, :].transpose(0, 2, 1).reshape(-1, sim.model.nq)
-    last = np.broadcast_to(lanes[WORLDS - 1], lanes[WORLDS:].shape)
-    np.testing.assert_array_equal(lanes[WORLDS:], last)  # the unused ones
+    unused = spare(sim)
+    np.testing.assert_array_equal(unused, np.broadcast_to(sim.joint_q[-1], unused.shape))
 
 
 def test_worlds_of_the_scene_differ(sim):
@@ -103,7 +67,7 @@ def test_worlds_of_the_scene_differ(sim):
     assert {NONFINITE, FALL, OVERSPEED} <= {bit for bit in (1, 2, 4, 8) if (status & bit).any()}
     assert not status.all()
     rows = carried(sim)
-    for name in ("q", "qd", "impulse"):
+    for name in ("joint_q", "joint_qd", "impulse"):
         assert len(np.unique(rows[name].reshape(WORLDS, -1), axis=0)) == WORLDS
 
 
@@ -124,50 +88,50 @@ SWAP[[0, 36]] = 36, 0  # a world of the first group with one of the last, which 
 )
 def test_permutations(sim, sources):
     """A world that is copied from may itself be overwritten."""
-    start = sim.snapshot()
+    start = sim.state()
     check(sim, sources)
-    sim.restore(start)
+    sim.place(start)
 
 
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(sources=st.lists(st.integers(0, WORLDS - 1), min_size=WORLDS, max_size=WORLDS), in_place=st.booleans())
 def test_any_sources(sim, sources, in_place):
-    start = sim.snapshot()
+    start = sim.state()
     check(sim, fixed(sources) if in_place else np.array(sources))
-    sim.restore(start)
+    sim.place(start)
 
 
 def test_status_goes_along(sim):
-    start, status = sim.snapshot(), sim.status
+    start, status = sim.state(), sim.status
     sources = np.roll(np.arange(WORLDS), 4)
     sim.copy_worlds(sources)
     np.testing.assert_array_equal(sim.status, status[sources])
-    sim.restore(start)
+    sim.place(start)
     np.testing.assert_array_equal(sim.status, status)
 
 
 def test_targets_forces_and_masses_stay(sim):
-    start = sim.snapshot()
+    start = sim.state()
     before = [sim._read(getattr(sim._world, name)) for name in ("target", "force", "mass_scale")]
     assert all(len(np.unique(rows.reshape(WORLDS, -1), axis=0)) == WORLDS for rows in before)
     sim.copy_worlds(np.roll(np.arange(WORLDS), 1))
     for name, rows in zip(("target", "force", "mass_scale"), before):
         np.testing.assert_array_equal(sim._read(getattr(sim._world, name)), rows)
-    sim.restore(start)
+    sim.place(start)
 
 
 @pytest.mark.parametrize("lanes", [1, 16])
-def test_a_restored_state_goes_on_the_same(player, lanes):
-    """Bit for bit, from before falls, resets and copies; and a snapshot is no view of what goes on."""
+def test_a_state_goes_on_the_same(player, lanes):
+    """Bit for bit, from before falls, resets and copies; and a state is no view of what goes on."""
     sim = varied(player, lanes)
-    start, before = sim.snapshot(), carried(sim)
+    start, before = sim.state(), carried(sim)
     sim.step(5)
     first = carried(sim)
-    assert not np.array_equal(first["q"], before["q"])
+    assert not np.array_equal(first["joint_q"], before["joint_q"])
     sim.copy_worlds(np.arange(WORLDS)[::-1])
     sim.reset([1, 2])
     for _ in range(2):
-        sim.restore(start)
+        sim.place(start)
         for name, rows in carried(sim).items():
             np.testing.assert_array_equal(rows, before[name], err_msg=name)
         sim.step(5)
@@ -176,14 +140,14 @@ def test_a_restored_state_goes_on_the_same(player, lanes):
 
 
 def test_worlds_side_by_side(player, monkeypatch):
-    """The layout that CUDA uses: copies, and a snapshot restored."""
+    """The layout that CUDA uses: copies, and a state that worlds are put back into."""
     monkeypatch.setattr(Batch, "_side_by_side", property(lambda self: True, lambda self, value: None), False)
     columns = varied(player, lanes=1)
     assert columns._world.q.strides[0] < columns._world.q.strides[1]
-    start, before = columns.snapshot(), carried(columns)
+    start, before = columns.state(), carried(columns)
     for sources in (SWAP, fixed(np.random.default_rng(3).integers(WORLDS, size=WORLDS)), np.full(WORLDS, 5)):
         check(columns, sources)
-        columns.restore(start)
+        columns.place(start)
         for name, rows in carried(columns).items():
             np.testing.assert_array_equal(rows, before[name], err_msg=name)
 
