@@ -288,12 +288,15 @@ def _alike(default: Any, value: Any, name: str) -> Any:
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
-    """In which keys two tables differ, beyond those that may."""
+    """In which keys two tables differ, beyond those that may. A key that one lacks, being of another version,
+    stands for what is empty: "", false, nothing."""
     a, b = _flat(there), _flat(here)
     return [
         f"{key} is {_shown(a, key)} there and {_shown(b, key)} here"
         for key in [*b, *(key for key in a if key not in b)]
-        if key not in FREE and (key not in a or key not in b or a[key] != b[key])
+        if key not in FREE
+        and (a.get(key) or b.get(key))
+        and (key not in a or key not in b or a[key] != b[key])
     ]
 
 
