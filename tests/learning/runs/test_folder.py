@@ -74,6 +74,11 @@ def test_differences_name_keys():
     assert said == ["d is missing there and 3 here", "a.c is 2 there and missing here"]
 
 
+def test_keys_of_a_skill_that_an_older_version_did_not_have_are_empty(own):
+    assert Run.begin(own, SKILL | {"units": "", "turns": [], "loud": False, "more": {}}).begun
+    refused(r'skill\.units is missing there and "cm" here', "out", Run.begin, own, SKILL | {"units": "cm"})
+
+
 def test_a_folder_that_is_no_run_is_left_alone(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     refused(r"is not empty and holds no run \(notes\.txt\)$", "out", Run.begin, tmp_path, SKILL)
