@@ -44,9 +44,11 @@ class Course:
                 if (column[place] >= 0).any():
                     raise ValueError(f"joint '{name}' is steered twice")
                 column[place] = self.columns + (np.arange(count) if isinstance(one, str) else 0)
-                own = np.ones(count) if isinstance(one, str) else np.atleast_1d(one[name])
+                own = np.ones(count)
+                if not isinstance(one, str):
+                    own = np.atleast_1d(one[name])
                 if own.shape != (count,):
-                    raise ValueError(f"joint '{name}' takes a gain for each of {count} dofs, not {one[name]}")
+                    raise ValueError(f"joint '{name}' takes a gain for each of {count} dofs, not {own}")
                 gain[place] = own
             self.columns += count if isinstance(one, str) else 1
         self._course = course = sim.program("step").Course()

@@ -31,10 +31,7 @@ def find_place(model: Model, where: str | Place) -> Place:
         return Place(model.body_names[body], _triple(at))
     if where not in model.body_names:
         raise ValueError(f"the model has no body and no site named '{where}'")
-    shape = next((s for s in model.shapes if s.body == model.body(where)), None)
-    if shape is None:
-        raise ValueError(f"body '{where}' has no shape, so no middle")
-    return Place(where, _triple(shape.pos))
+    return Place(where, _triple(model.first_shape(model.body(where)).pos))
 
 
 def tip(model: Model, body: str) -> Place:

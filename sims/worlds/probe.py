@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from .. import trees
 from .places import Place, find_place, on_links
 from .terms import Term
 
@@ -60,14 +61,14 @@ class Probe:
         if goals is None and any(term.judged for term in terms.values()):
             raise ValueError("what is judged needs goals")
         self._probe = probe = self._program.Probe()
-        root = model.joint_names[0]
         probe.root = int(model.joint_link[0])
         judged = [name for term in terms.values() for name in term.judged]
         for name in judged:
             if model.joint_type(name) == "free":
                 raise ValueError(f"joint '{name}' is free: it has no goal here")
         whole = {"COM", "COM_VELOCITY", "ANGULAR_MOMENTUM", "FROM_COM"} & {t.kind for t in terms.values()}
-        own = _tree_links(model, root) if whole else np.zeros(0, int)
+        below = trees.below(model.tables["link_parent"], probe.root) if whole else []
+        own = np.intersect1d(below, model.tables["body_link"]).astype(int)
         first = [find_place(model, t.places[0]) if t.places else None for t in terms.values()]
         last = [find_place(model, t.places[-1]) if t.places else None for t in terms.values()]
         nowhere = Place(model.body_names[0], (0.0, 0.0, 0.0))
@@ -133,13 +134,3 @@ class Probe:
         self.sim._take_over()
         self._launch()
         return self._out
-
-
-def _tree_links(model: Any, root: str) -> np.ndarray:
-    """Links of the tree that hangs from a free joint."""
-    t = model.tables
-    found = {int(model.joint_link[model.joint(root)])}
-    for link, parent in enumerate(t["link_parent"]):
-        if parent in found:
-            found.add(link)
-    return np.intersect1d(sorted(found), t["body_link"])

@@ -316,7 +316,7 @@ def test_a_body_without_a_shape():
         '<body name="b"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
     )
     sim = Simulation(lone, 2)
-    with pytest.raises(ValueError, match="body 'b' has no shape, so no middle"):
+    with pytest.raises(ValueError, match="body 'b' of the model has no shape"):
         Probe(sim, {"there": terms.point("b")})
     q = np.array([[1.0, 2.0, 3.0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)]] * 2)
     sim.reset(joint_q=q, joint_qd=[1.0, 0, 0, 0, 0, 0])
