@@ -61,7 +61,7 @@ class ControlGraph:
     motion: np.ndarray | None = None
     """(fragments * STEPS, nq) the reference after each time step; None in graphs of older files"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         edges = np.asarray(self.edges, int).reshape(-1, 2)
         if edges.size and not (edges.min() >= 0 and edges.max() < self.count):
             raise ValueError(f"edges lead outside the {self.count} fragments of the graph")

@@ -69,6 +69,7 @@ __getattr__, __dir__ = lazily(
         ".recording": "Motion",
         ".reference": "Cycle Reference close_cycle mirrored",
         ".retarget": "MappingError find_mapping read_mapping retargeted",
-        ".worlds": "Simulation Contacts State Course Probe Watch terms watch NONFINITE FALL BAD_CONTACT OVERSPEED",
+        ".worlds": "Simulation Contacts State Course Probe Watch "
+        "terms watch NONFINITE FALL BAD_CONTACT OVERSPEED",
     },
 )

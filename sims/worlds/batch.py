@@ -145,7 +145,7 @@ class Batch:
             setattr(world, name, array.transpose() if self._side_by_side else array)
         self._blocks = self._block_table(self._layout)
 
-    def _block_table(self, layout: Layout) -> wp.array:
+    def _block_table(self, layout: Layout) -> wp.array[Any, Any]:
         """The kernels' view of a layout, in the order of this batch's quantities."""
         block = self.program("place").Block
         absent = Block(0, 0, 1, 1, 0, 0)
@@ -157,25 +157,25 @@ class Batch:
         """Floats that one number of an array has for each world."""
         return int(wp.types.type_size_in_bytes(dtype) // (4 * self.lanes))
 
-    def _allocate(self, count: int, dtype: Any) -> wp.array:
+    def _allocate(self, count: int, dtype: Any) -> wp.array[Any, Any]:
         """Zeros `(groups, count)`."""
         shape = (self.groups, max(count, 1))
         if self._side_by_side:
             return wp.zeros(shape[::-1], dtype=dtype, device=self.device).transpose()
         return wp.zeros(shape, dtype=dtype, device=self.device)
 
-    def new_port(self, columns: int) -> wp.array:
+    def new_port(self, columns: int) -> wp.array[Any, Any]:
         """Zeros `(world_count, columns)`, for what crosses the edge; see `kernels.port`."""
         shape = (self.world_count, columns)
         if self._side_by_side:
             return wp.zeros(shape[::-1], dtype=float, device=self.device).transpose()
         return wp.zeros(shape, dtype=float, device=self.device)
 
-    def new_rows(self) -> wp.array:
+    def new_rows(self) -> wp.array[Any, Any]:
         """Zeros `(world_count,)`, for the row of a table or a pool that each world has."""
         return wp.zeros(self.world_count, dtype=int, device=self.device)
 
-    def set_rows(self, array: wp.array, rows: Any) -> None:
+    def set_rows(self, array: wp.array[Any, Any], rows: Any) -> None:
         """Set an array of `new_rows` (world_count,)."""
         if self.device.is_cpu:
             array.numpy()[:] = rows
@@ -193,7 +193,7 @@ class Batch:
         self._write("turn", everyone, ground, column=0)
         self._write("R", everyone, np.eye(3, dtype=np.float32).ravel(), column=0)
 
-    def _rows(self, array: wp.array) -> np.ndarray:
+    def _rows(self, array: wp.array[Any, Any]) -> np.ndarray:
         """An array as float32 `(groups, n, parts, lanes)`: on a CPU a view, on CUDA a copy."""
         rows = array.numpy()
         if self._side_by_side:
@@ -201,7 +201,7 @@ class Batch:
         rows = rows.view(np.float32) if rows.dtype.fields else rows
         return rows.reshape(self.groups, array.shape[1], -1, self.lanes)
 
-    def _read(self, array: wp.array) -> np.ndarray:
+    def _read(self, array: wp.array[Any, Any]) -> np.ndarray:
         """`(world_count, n, parts)` of an array, parts dropped where there is one."""
         rows = self._rows(array).transpose(0, 3, 1, 2)
         rows = rows.copy()  # never a view of what the next step changes
@@ -233,7 +233,7 @@ class Batch:
             rows[group, :, :, lane] = values
         self._assign(array, rows)
 
-    def _assign(self, array: wp.array, rows: np.ndarray) -> None:
+    def _assign(self, array: wp.array[Any, Any], rows: np.ndarray) -> None:
         """Set an array to float32 `(groups, n, parts, lanes)`, as `_rows` gives them."""
         if not self._side_by_side:
             there = self._rows(array)

@@ -100,7 +100,7 @@ class Probe:
 
     def _set(self, name: str, values: Any, dtype: Any) -> None:
         kind = np.int32 if dtype is int else np.float32
-        array: wp.array = wp.array(np.asarray(values, kind), dtype=dtype, device=self.sim.device)
+        array: wp.array[Any, Any] = wp.array(np.asarray(values, kind), dtype=dtype, device=self.sim.device)
         setattr(self._probe, name, array)
 
     def _set_table(self, name: str, values: Any, width: int) -> None:
@@ -125,7 +125,7 @@ class Probe:
         self.measure(rows)
         return np.array(self._out.numpy()), np.array(self._cost.numpy()[:, 0])
 
-    def measure(self, rows: Any = 0) -> wp.array:
+    def measure(self, rows: Any = 0) -> wp.array[Any, Any]:
         """The port `(world_count, size)` with the present observations; the next call writes to it."""
         rows = np.asarray(rows)
         if rows.min() < 0 or rows.max() >= self.rows:

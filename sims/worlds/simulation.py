@@ -72,16 +72,16 @@ class Simulation(Batch):
         self._tree.sweeps = sweeps
         self._tree.max_speed = max_speed
         self._targets_set = False
-        self._ports: dict[str, wp.array] = {}
+        self._ports: dict[str, wp.array[Any, Any]] = {}
         self._row = self.new_rows()
-        self._pool_blocks: tuple[Layout, wp.array] | None = None
+        self._pool_blocks: tuple[Layout, wp.array[Any, Any]] | None = None
         inputs = [self._row, self._carried, self._blocks, self._carried, self._blocks]
         self._copy = self.prepared(self.program("place"), "place", inputs)
         self.reset()
 
     # --------------------------------------------------------------------------------------- the edge
 
-    def port(self, name: str) -> wp.array:
+    def port(self, name: str) -> wp.array[Any, Any]:
         """Live memory `(world_count, n)` of joint_q, joint_qd, joint_target_q or joint_f: it shows what the
         worlds have, and what is written to it they have, on every device and at every lane count. From the
         first call on, each step costs the two copies that this takes; one lane has none, as its worlds lie
@@ -113,7 +113,7 @@ class Simulation(Batch):
 
     # ------------------------------------------------------------------------------------ control
 
-    def _values(self, name: str, values, n: int, count: int) -> np.ndarray:
+    def _values(self, name: str, values: Any, n: int, count: int) -> np.ndarray:
         """Checked `(n,)` or `(count, n)` float32, from NumPy or torch."""
         values = as_array(values)
         if values.shape not in ((n,), (count, n), (1, n)):
@@ -132,7 +132,7 @@ class Simulation(Batch):
             q[..., k : k + 4] /= length
         return q
 
-    def reset(self, worlds=None, joint_q=None, joint_qd=None) -> None:
+    def reset(self, worlds: Any = None, joint_q: Any = None, joint_qd: Any = None) -> None:
         """Put worlds into a state: by default all of them, the model's start pose, at rest.
 
         joint_q: (nq,) or (len(worlds), nq) [m, rad, -]; joint_qd likewise (nv) [m/s, rad/s]. Clears
@@ -199,7 +199,7 @@ class Simulation(Batch):
         with self._changing():
             self._copy()
 
-    def set_targets(self, joint_target_q) -> None:
+    def set_targets(self, joint_target_q: Any) -> None:
         """Targets of the drives: (nq,) or (world_count, nq), laid out as joint_q."""
         target = self._values("joint_target_q", joint_target_q, self.model.nq, self.world_count)
         target = self._unit(target, "joint_target_q")
@@ -207,13 +207,13 @@ class Simulation(Batch):
             self._write("target", np.arange(self.world_count), target)
         self._targets_set = True
 
-    def set_joint_force(self, joint_f) -> None:
+    def set_joint_force(self, joint_f: Any) -> None:
         """Generalised forces on all dofs, until changed: (nv,) or (world_count, nv) [N, N m]."""
         f = self._values("joint_f", joint_f, self.model.nv, self.world_count)
         with self._changing():
             self._write("joint_f", np.arange(self.world_count), f)
 
-    def apply_force(self, body: str | int, force, worlds=None) -> None:
+    def apply_force(self, body: str | int, force: Any, worlds: Any = None) -> None:
         """A force (3,) or (len(worlds), 3) [N, world axes] at a body's centre of mass, until changed."""
         worlds = self._worlds(worlds)
         body = self.model.body(body) if isinstance(body, str) else int(body)
@@ -386,7 +386,7 @@ class Simulation(Batch):
         b: str,
         restitution: float | np.ndarray | None = None,
         friction: float | np.ndarray | None = None,
-        worlds=None,
+        worlds: Any = None,
     ) -> None:
         """Set the restitution and friction [-] of every contact between two shapes or bodies, in some
         worlds; a number, or one per world. Raises ValueError where a and b cannot touch."""
@@ -420,7 +420,7 @@ class Simulation(Batch):
             groups.setdefault(body, set()).add(k)
         return groups
 
-    def set_mass(self, body: str, mass: float | np.ndarray, worlds=None) -> None:
+    def set_mass(self, body: str, mass: float | np.ndarray, worlds: Any = None) -> None:
         """Set a body's mass [kg] in some worlds, its inertia in proportion; a number, or one per world."""
         worlds = self._worlds(worlds)
         b = self.model.body(body)

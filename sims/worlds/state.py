@@ -72,7 +72,7 @@ class State:
     number of worlds they came from. What a state lacks is zero. They can be cloned, picked from and pickled.
     """
 
-    def __init__(self, data: wp.array, layout: Layout):
+    def __init__(self, data: wp.array[Any, Any], layout: Layout):
         self.data, self.layout = data, layout
 
     @staticmethod

@@ -6,11 +6,14 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed, without_nan
+
+if TYPE_CHECKING:
+    from ..learning.evaluate.pushes import PushTable
 
 
 @dataclass
@@ -110,7 +113,7 @@ class Evaluate:
         return 0
 
 
-def _table(table) -> dict:
+def _table(table: PushTable) -> dict[str, Any]:
     from ..learning.evaluate.pushes import DIRECTIONS, ENOUGH, PUSH_TIME
 
     largest = table.largest()
@@ -125,7 +128,7 @@ def _table(table) -> dict:
     }
 
 
-def _text(report: dict) -> list[str]:
+def _text(report: dict[str, Any]) -> list[str]:
     def shown(key: str, unit: str) -> str:
         return "-" if report[key] is None else f"{report[key]:.2f} {unit}"
 
@@ -144,7 +147,7 @@ def _text(report: dict) -> list[str]:
     return lines + (_push_text(report["pushes"]) if "pushes" in report else [])
 
 
-def _push_text(table: dict) -> list[str]:
+def _push_text(table: dict[str, Any]) -> list[str]:
     lines = [f"pushes    of {table['seconds']:g} s on the torso; % that stand 4 s later, by direction"]
     heads = ["".join(word[0] for word in name.split()) for name in table["directions"]]
     lines.append(f"{'N':>9} " + "".join(f"{head:>5}" for head in heads))
