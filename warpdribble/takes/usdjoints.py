@@ -21,6 +21,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 
 from ..sims.model import Joint, Model
+from ..sims.model.mjcf import ANYWHERE
 from .names import prim_names
 
 KINDS = ("revolute", "d6", "spherical")
@@ -30,7 +31,7 @@ AXES = "XYZ"
 Ends = tuple[str | None, str]
 """Paths of the bodies that a joint ties: the parent's, None for the world, and the child's."""
 Gains = tuple[float, float, float]
-"""kp [N m/rad], kd [N m s/rad], effort [N m]"""
+"""kp [N m/rad], kd [N m s/rad], effort [N m], ANYWHERE where it has no limit."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def _add_joint(
     turn: Rotation,
     kind: str,
 ) -> None:
-    gains = (joint.kp, joint.kd, joint.effort) if joint.driven else None
+    gains = (joint.kp, joint.kd, joint.effort) if joint.kp > 0.0 else None
     limits, armature = joint.limits, joint.armature
     at_start = frame0.R.inv() * turn * frame1.R
     if joint.kind != "ball":
@@ -215,7 +216,8 @@ def _drive(prim: Usd.Prim, where: str, gains: Gains | None, angle: float) -> Non
     drive.CreateTypeAttr("force")
     drive.CreateStiffnessAttr(gains[0] * PER_DEGREE)
     drive.CreateDampingAttr(gains[1] * PER_DEGREE)
-    drive.CreateMaxForceAttr(gains[2])
+    if gains[2] < ANYWHERE:
+        drive.CreateMaxForceAttr(gains[2])
     drive.CreateTargetPositionAttr(float(np.degrees(angle)))
     drive.CreateTargetVelocityAttr(0.0)
 

@@ -3,8 +3,10 @@ import pytest
 from pxr import Usd, UsdPhysics
 from scipy.spatial.transform import Rotation
 
+from warpdribble.sims import Model
+from warpdribble.sims.model import pose
 from warpdribble.takes import usdjoints
-from warpdribble.takes.take import validate, write_take
+from warpdribble.takes.take import Take, validate, write_take
 
 JOINTS = "/World/Player/Joints"
 
@@ -124,10 +126,6 @@ def test_a_cone_goes_around_the_bone(stages):
 
 
 def test_joints_with_an_offset_and_two_in_a_body(tmp_path):
-    from warpdribble.sims import Model
-    from warpdribble.sims.model import pose
-    from warpdribble.takes.take import Take
-
     (tmp_path / "m.xml").write_text(
         """<mujoco><worldbody><body name="door" pos="1 0 0" euler="0 0 30">
         <joint name="hinge" type="hinge" axis="0 0 1" pos="0 .2 0" ref="20" range="-10 80"/>
@@ -154,6 +152,22 @@ def test_joints_with_an_offset_and_two_in_a_body(tmp_path):
     for name in ("a", "b"):
         (a, _), (b, _) = ends(UsdPhysics.Joint(stage.GetPrimAtPath(f"{JOINTS}/{name}")), take)
         assert np.allclose(a, b, atol=1e-6)
+
+
+def test_a_drive_without_an_effort_limit_is_a_drive(tmp_path):
+    (tmp_path / "m.xml").write_text(
+        """<mujoco><worldbody><body name="door"><joint name="hinge"/><geom size=".1"/></body>
+        <body name="free" pos="1 0 0"><joint name="loose"/><geom size=".1"/></body></worldbody>
+        <actuator><position joint="hinge" kp="30" kv="2"/></actuator></mujoco>"""
+    )
+    model = Model.load(tmp_path / "m.xml")
+    take = Take.of(model, pose.forward(model, model.start_q[None]), 10.0)
+    stage = Usd.Stage.Open(str(write_take(tmp_path / "m.usdc", take)))
+    drive = UsdPhysics.DriveAPI(stage.GetPrimAtPath(f"{JOINTS}/hinge"), "angular")
+    assert drive.GetStiffnessAttr().Get() * 57.29578 == pytest.approx(30.0, rel=1e-6)
+    assert drive.GetDampingAttr().Get() * 57.29578 == pytest.approx(2.0, rel=1e-6)
+    assert np.isinf(drive.GetMaxForceAttr().Get())
+    assert not stage.GetPrimAtPath(f"{JOINTS}/loose").HasAPI(UsdPhysics.DriveAPI)
 
 
 def test_an_unknown_way_is_refused(dribble_take, tmp_path):
