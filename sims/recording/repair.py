@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..errors import InputError
 from ..signals import continuous, interpolate_lines, interpolate_rotations, low_pass
 from . import anatomy, defects
 from .motion import RECORDED, Motion
@@ -38,10 +39,10 @@ SOLE = 0.02
 
 
 def repair(motion: Motion, names: Collection[str]) -> tuple[Motion, list[str]]:
-    """The motion with the named repairs, and a note on each. Raises ValueError for an unknown name."""
+    """The motion with the named repairs, and a note on each. Raises InputError for an unknown name."""
     for name in names:
         if name not in REPAIRS:
-            raise ValueError(f"--repair {name}: give some of {', '.join(REPAIRS)}, joined by commas")
+            raise InputError(f"there is no repair '{name}': there are {', '.join(REPAIRS)}", "", "repairs")
     notes = []
     for name in REPAIRS:
         if name in names:

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+from ..sims.errors import InputError
+
 TIMEOUT = 30.0
 """[s] without an answer after which a download is given up."""
 
@@ -56,7 +58,7 @@ SETS = {"cmu": CMU, "ballplay": BALLPLAY}
 FOLDERS = {"cmu": "cmu", "ballplay": "ballplay_m"}
 
 
-class FetchError(ValueError):
+class FetchError(InputError):
     """A file that could not be brought; the message is one line with the file and the reason."""
 
 
@@ -103,7 +105,7 @@ def fetch(
     """
     folder = Path(folder) if folder is not None else data_folder()
     if mirror is not None and "://" not in mirror and not Path(mirror).is_dir():
-        raise FetchError(f"--mirror {mirror}: no such folder")
+        raise FetchError("no such folder", mirror, "mirror")
     brought, unknown = [], []
     for done, entry in enumerate(entries(name)):
         target = folder / entry.file
@@ -125,7 +127,7 @@ def _source(entry: Entry, mirror: str | None) -> str | None:
     for path in (Path(mirror) / entry.file, Path(mirror) / Path(entry.file).name):
         if path.is_file():
             return str(path)
-    raise FetchError(f"--mirror {mirror}: has no {entry.file}")
+    raise FetchError(f"has no {entry.file}", mirror, "mirror")
 
 
 def _bring(entry: Entry, target: Path, source: str | None) -> Path:
@@ -146,11 +148,11 @@ def _bring(entry: Entry, target: Path, source: str | None) -> Path:
         )
     except ValueError as error:
         if "hash" not in str(error):
-            raise FetchError(f"{entry.file}: {error}") from None
-        raise FetchError(f"{entry.file}: {source} is another file (its sha256 differs)") from None
+            raise FetchError(str(error), entry.file) from None
+        raise FetchError(f"{source} is another file (its sha256 differs)", entry.file) from None
     except OSError as error:
         reason = error.strerror or f"{source} could not be reached ({type(error).__name__})"
-        raise FetchError(f"{entry.file}: {reason}; with the files at hand give --mirror FOLDER") from None
+        raise FetchError(reason, entry.file, "files") from None
     return target
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..sims.errors import InputError
 from ..sims.recording import anatomy
 from ..sims.recording.motion import Motion
 from .errors import ClipError
@@ -89,12 +90,13 @@ def _unit(
     raise ClipError(
         path,
         f"cannot tell the length unit: from root to farthest end {longest:.4g} units; "
-        f"give --units {', '.join(UNITS)} or metres per unit",
+        f"it may be {', '.join(UNITS)} or metres per unit",
+        "units",
     )
 
 
 def metres(units: str | float) -> float:
-    """Metres per unit of a name of UNITS or a number. Raises ValueError for anything else."""
+    """Metres per unit of a name of UNITS or a number. Raises InputError for anything else."""
     if units in UNITS:
         return UNITS[units]
     try:
@@ -102,7 +104,9 @@ def metres(units: str | float) -> float:
     except (TypeError, ValueError):
         scale = np.nan
     if not 1e-6 < scale < 1e6:
-        raise ValueError(f"--units {units}: give {', '.join(UNITS)} or metres per unit")
+        raise InputError(
+            f"there is no unit '{units}': it is {', '.join(UNITS)} or metres per unit", "", "units"
+        )
     return scale
 
 
@@ -110,7 +114,7 @@ def _up(path: Path, motion: Motion, up: str | None) -> tuple[str, str]:
     """The axis that points up, and how it was told: from the feet to the head over the clip."""
     if up is not None:
         if up not in TO_Z_UP:
-            raise ValueError(f"--up {up}: give x, y or z")
+            raise InputError(f"there is no axis '{up}': it is x, y or z", "", "up")
         return up, f"up axis given: {up.upper()}"
     found = anatomy.parts(motion.joint_names, motion.parents)
     feet = [found[part] for part in ("left_ankle", "right_ankle") if part in found]
@@ -123,7 +127,7 @@ def _up(path: Path, motion: Motion, up: str | None) -> tuple[str, str]:
         along = np.ptp(places, axis=1).mean(axis=0)
     order = np.argsort(np.abs(along))
     if along[order[2]] < 1.5 * max(abs(along[order[1]]), 1e-9):
-        raise ClipError(path, "cannot tell which axis points up; give --up x, --up y or --up z")
+        raise ClipError(path, "cannot tell which axis points up: x, y or z", "up")
     return "xyz"[order[2]], f"{'XYZ'[order[2]]} points up"
 
 

@@ -16,6 +16,10 @@ HINTS = {
     "cyclic": "take one of those that warpdribble skill list says are",
     "root": "try --root tracked, or another clip",
     "mirror": "give another --mirror",
+    "files": "with the files at hand give --mirror FOLDER",
+    "units": "say which with --units",
+    "up": "say which with --up",
+    "repairs": "give others with --repair",
     "mapping": "give another --mapping",
     "seed": "try another --seed",
 }

@@ -19,6 +19,7 @@ from ..sims.ball.ball import (
     recorded_ball,
 )
 from ..sims.ball.hands import find_hands
+from ..sims.errors import InputError
 from ..sims.model import Model
 from ..sims.reference.mirror import mirrored
 from ..sims.reference.reference import Cycle, Reference, close_cycle, closing
@@ -42,15 +43,25 @@ class StagedSkill:
     notes: tuple[str, ...] = ()
 
 
+READING = ("frames", "units", "up", "repairs")
+"""Keys that say how a clip is read, and hints of what is wrong with them."""
+
+
 def find_clip(skill: Skill, data: str | Path | None = None) -> Path:
     """Path of a skill's recording. data: folder of recordings, None for the usual one. Raises SkillError."""
-    own = Path(skill.clip)
+    return _found(skill, "clip", data)
+
+
+def _found(skill: Skill, key: str, data: str | Path | None) -> Path:
+    own = Path(getattr(skill, key))
+    if skill.is_clip:
+        return own
     folder = Path(data) if data else data_folder()
     places = [own] if own.is_absolute() else [folder / own, Path(skill.source).parent / own]
     for place in places:
         if place.exists():
             return place
-    raise SkillError(skill.source, "clip", f"no file '{skill.clip}' in {folder}", "fetch")
+    raise SkillError(skill.source, key, f"no file '{own}' in {folder}", "fetch")
 
 
 def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> StagedSkill:
@@ -113,24 +124,23 @@ def _recorded(
 ) -> tuple[Reference, Ball | None, list[str]]:
     from ..clips import read_part
 
-    path = Path(skill.clip) if skill.is_clip else find_clip(skill, data)
+    path = find_clip(skill, data)
+    asf = _found(skill, "asf", data) if skill.asf else None
 
     def fail(key: str, reason: str, error: ValueError) -> ValueError:
         if skill.is_clip:
-            return error if isinstance(error, ClipError) else ClipError(path, reason)
+            return error if isinstance(error, InputError) else ClipError(path, reason, key)
         return SkillError(skill.source, key, reason)
 
-    reading = {name: getattr(skill, name) or None for name in ("units", "up", "asf")}
     try:
-        motion, notes = read_part(path, skill.frames, skill.repairs, **reading)
-    except ClipError as error:
-        key = error.hint if error.hint == "frames" else "clip"
+        reading = skill.units or None, skill.up or None, asf
+        motion, notes = read_part(path, skill.frames, skill.repairs, *reading)
+    except InputError as error:
+        key = error.hint if error.hint in READING else "clip"
         raise fail(key, f"{path.name}: {error.reason}", error) from None
-    except ValueError as error:
-        raise fail("repairs", str(error), error) from None
     if motion.duration < 2 * model.timestep:
         reason = f"its frames last only {motion.duration:.3f} s"
-        raise fail("frames", reason, ClipError(path, reason))
+        raise fail("frames", reason, ClipError(path, reason, "frames"))
     try:
         mapping = read_mapping(skill.mapping) if skill.mapping else find_mapping(motion)
         result = retargeted(model, motion, mapping)

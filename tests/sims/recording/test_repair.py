@@ -128,5 +128,5 @@ def test_short_motions_pass(frames):
 
 
 def test_an_unknown_repair_is_refused():
-    with pytest.raises(ValueError, match="--repair shoes"):
+    with pytest.raises(ValueError, match="no repair 'shoes': there are spikes, "):
         repair(walking(), ["shoes"])

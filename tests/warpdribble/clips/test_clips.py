@@ -3,6 +3,7 @@ import pytest
 
 from warpdribble.clips.bvh import read_bvh
 from warpdribble.clips.read import ClipError, read_clip, read_part
+from warpdribble.sims.errors import InputError
 
 
 def with_axes(text, order):
@@ -64,13 +65,15 @@ def test_units_and_up_can_be_given(cmu_clip):
 
 @pytest.mark.parametrize("reading", [{"units": "mile"}, {"units": "-1"}, {"units": "nan"}, {"up": "w"}])
 def test_units_and_axes_that_are_none(cmu_clip, reading):
-    with pytest.raises(ValueError, match="give"):
+    ((hint, value),) = reading.items()
+    with pytest.raises(InputError, match=f"there is no .* '{value}': it is") as error:
         read_clip(cmu_clip, **reading)
+    assert error.value.hint == hint
 
 
 def test_ballplay_has_its_own_units(ballplay_clip):
     read_clip(ballplay_clip, units="m", up="z")
-    with pytest.raises(ClipError, match="leave out"):
+    with pytest.raises(ClipError, match="in metres, Z up: say neither units nor up"):
         read_clip(ballplay_clip, units="cm")
 
 
@@ -87,10 +90,12 @@ def test_a_part_is_cut_after_it_was_repaired(cmu_clip):
     assert np.array_equal(part.rotations, whole.rotations[20:61])
     assert [n.split(":")[0] for n in notes[-2:]] == ["repair toes", "repair ground"]
     for frames in ((60, 20), (0, 500), (-3, 5)):
-        with pytest.raises(ClipError, match="0 to 120"):
+        with pytest.raises(ClipError, match="0 to 120") as error:
             read_part(cmu_clip, frames)
-    with pytest.raises(ValueError, match="--repair hair"):
+        assert error.value.hint == "frames"
+    with pytest.raises(InputError, match="no repair 'hair': there are spikes, ") as error:
         read_part(cmu_clip, repairs="hair")
+    assert error.value.hint == "repairs"
 
 
 def test_more_than_one_end_site_is_no_mistake(cmu_clip):

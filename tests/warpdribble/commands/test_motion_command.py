@@ -63,9 +63,15 @@ def test_an_amc_clip_with_units_and_axis(capsys, amc_clip):
     ("options", "word"),
     [
         (["--frames", "50", "20"], "0 to 120"),
-        (["--units", "mile"], "--units mile"),
+        (
+            ["--units", "mile"],
+            "no unit 'mile': it is m, cm, mm, inch, foot, cmu or metres per unit; say which with --units",
+        ),
         (["--up", "w"], "--up"),
-        (["--repair", "hair"], "--repair hair"),
+        (
+            ["--repair", "hair"],
+            "no repair 'hair': there are spikes, toes, lowpass, ground; give others with --repair",
+        ),
         (["--format", "xml"], "--format"),
     ],
 )
