@@ -23,11 +23,17 @@ def skill_fields(skill: Skill) -> dict[str, Any]:
 
 def skill_text(skill: Skill) -> str:
     """The file of a skill; what it would say, where it has none yet."""
-    if skill.is_clip:
-        known = {key: value for key, value in skill_fields(skill).items() if value not in ("", (), {}, False)}
-        return "".join(f"{key} = {json.dumps(value)}\n" for key, value in known.items())
-    source = Path(skill.source)
-    return (source if source.exists() else asset(str(source))).read_text(encoding="utf-8")
+    if not skill.is_clip:
+        source = Path(skill.source)
+        return (source if source.exists() else asset(str(source))).read_text(encoding="utf-8")
+    paths = {key: str(Path(getattr(skill, key)).absolute()) for key in ("clip", "asf") if getattr(skill, key)}
+    usual, said = asdict(Skill("", "")), skill_fields(skill) | paths
+    contact = said.pop("contact") | {key: said.pop(key) for key in ("checkpoints", "heights") if said[key]}
+    lines = [f"{key} = {json.dumps(value)}" for key, value in said.items() if value != usual[key]]
+    lines += (
+        ["[contact]", *(f"{key} = {json.dumps(value)}" for key, value in contact.items())] if contact else []
+    )
+    return "\n".join(lines) + "\n"
 
 
 def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGraph, tuple[str, ...]]:

@@ -70,7 +70,7 @@ class Skill:
 
 def clip_skill(clip: str | Path, frames: tuple[int, int] = (0, -1), **rest: Any) -> Skill:
     """A part of a clip as a skill that has no file yet. rest: fields of `Skill`; None stands for empty."""
-    path = str(Path(clip).absolute())
+    path = str(clip)
     rest = {key: "" if value is None else value for key, value in rest.items()}
     first, last = frames
     part = f"frames {first} to {'the last' if last < 0 else last}"
