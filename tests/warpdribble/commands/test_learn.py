@@ -1,26 +1,31 @@
+"""`learn`, `evaluate` and `export`, from the command line to the files."""
+
 import json
+import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 
 from warpdribble.cli import main
+from warpdribble.learning.methods import STAGES
 from warpdribble.learning.methods.samcon import Samcon, SamconConfig
-from warpdribble.learning.runs import folder as runs
 from warpdribble.learning.runs.log import read_rows
 from warpdribble.skills.graph import skill_graph
 from warpdribble.skills.skill import parse_skill
 from warpdribble.takes.take import validate
 
 NAME = "dribble-right-authored"
-SMALL = SamconConfig(iterations=6, islands=4, particles=32, walk=60, check_every=3)
+SMALL = {"iterations": 6, "islands": 4, "particles": 32, "walk": 60, "check_every": 3, "trials": 32}
 
 
 @pytest.fixture(scope="module")
 def small():
     """Learning that takes a second."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runs, "RunConfig", partial(runs.RunConfig, samcon=SMALL, trial_worlds=32))
+        config = partial(SamconConfig, **SMALL)
+        patch.setitem(STAGES, "locomotion", replace(STAGES["locomotion"], config=config))
         yield
 
 
@@ -32,10 +37,13 @@ def run(small, tmp_path_factory):
     return folder
 
 
-def refused(capsys, *arguments):
-    """The one line on stderr of a command that has to fail with status 2."""
+def refused(capsys, *arguments, late=False):
+    """The one line on stderr of a command that has to fail with status 2; late: beside what it waited for."""
     assert main([str(a) for a in arguments]) == 2
     said = capsys.readouterr().err
+    if late:
+        waiting, _, said = said.partition("\n")
+        assert waiting.startswith("compiling kernels")
     assert said.count("\n") == 1 and said.startswith("warpdribble: "), said
     return said
 
@@ -65,7 +73,11 @@ def test_learning_says_how_it_went_and_what_is_next(small, capsys, tmp_path):
     assert "survived, cost" in checks[0]
     assert main(["learn", NAME, "--out", str(out), "--iterations", "5"]) == 0
     assert "goes on   after 4 iterations" in capsys.readouterr().out
-    assert [row["iteration"] for row in read_rows(out)] == [1, 2, 3, 4, 5]
+    assert [row["iteration"] for row in read_rows(out / "locomotion")] == [1, 2, 3, 4, 5]
+    assert main(["learn", NAME, "--out", str(out), "--iterations", "5"]) == 0
+    said = capsys.readouterr().out
+    assert "goes on   after 5 iterations" in said and "learned   5 iterations" in said
+    assert "TensorBoard" not in said
 
 
 def test_a_run_that_is_stopped_says_how_to_go_on(small, capsys, tmp_path, monkeypatch):
@@ -82,14 +94,14 @@ def test_a_run_that_is_stopped_says_how_to_go_on(small, capsys, tmp_path, monkey
     assert said.startswith("warpdribble: stopped after 2 iterations; saved in ")
     assert said.endswith("the same command goes on")
     said = refused(capsys, "evaluate", tmp_path / "run")
-    assert "no policy yet" in said and "let it go on" in said
+    assert said.endswith("run: has no policy yet; let it go on with the same warpdribble learn\n")
 
 
 def test_an_evaluation_is_json(run, capsys):
     report = evaluated(capsys, run, "--cycles", "2", "--trials", "20")
     assert {"skill", "seed", "lived", "cost", "angle_error_deg", "end_error_cm"} < set(report)
     assert (report["trials"], report["cycles"], report["seed"]) == (20, 2.0, 1)
-    assert report["skill"] == NAME and report["iterations"] == SMALL.iterations
+    assert report["skill"] == NAME and report["iterations"] == SMALL["iterations"]
     assert type(report["survived"]) is int and 0 < report["survived"] <= 20
     assert report["survived"] / 20 <= report["lived"] <= 1.0
     assert 0.0 < report["drift_cm_per_cycle"] < 100.0 and 0.0 < report["angle_error_deg"] < 20.0
@@ -172,7 +184,8 @@ def test_an_export_with_a_skin_and_a_fall(run, capsys, tmp_path):
         (("--seed", "-1"), "--seed -1"),
         (("--device", "abacus"), "--device abacus: give cpu"),
         (("--data", "nowhere"), "--data nowhere: no such folder"),
-        (("--stage", "flying"), "--help"),
+        (("--stage", "flying"), "--stage flying: give one of locomotion"),
+        (("--workers", "0"), "--workers 0: give a number from 1"),
     ],
 )
 def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
@@ -185,8 +198,12 @@ def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
     [
         ("moonwalk", "no such skill; there are"),
         ("gone.toml", "no such file"),
-        ("once.toml", "the skill 'mine' is not cyclic: locomotion is learned on cycles"),
-        ("lost.toml", "no file 'lost.bvh'"),
+        (
+            "once.toml",
+            "the skill 'mine' is not cyclic: locomotion is learned on cycles; "
+            "take one of those that warpdribble skill list says are",
+        ),
+        ("lost.toml", "clip: no file 'lost.bvh' in "),
     ],
 )
 def test_what_cannot_be_learned(capsys, tmp_path, monkeypatch, skill, said):
@@ -202,7 +219,8 @@ def test_folders_that_are_taken_are_left_alone(run, capsys, tmp_path):
     assert f'another run: skill.name is "{NAME}" there and "waist" here; give another --out' in said
     (tmp_path / "notes.txt").write_text("mine")
     assert "holds no run (notes.txt)" in refused(capsys, "learn", NAME, "--out", tmp_path)
-    assert "is a file" in refused(capsys, "learn", NAME, "--out", tmp_path / "notes.txt")
+    said = refused(capsys, "learn", NAME, "--out", tmp_path / "notes.txt")
+    assert said.endswith("notes.txt: is a file, not a folder; give another --out\n")
     assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
 
 
@@ -240,8 +258,51 @@ def test_what_cannot_be_exported(run, capsys, tmp_path, monkeypatch, arguments, 
 
 @pytest.mark.parametrize("command", ["evaluate", "export"])
 def test_folders_without_a_policy(capsys, tmp_path, command):
-    assert "no such folder" in refused(capsys, command, tmp_path / "none")
-    assert "holds no run" in refused(capsys, command, tmp_path)
+    said = refused(capsys, command, tmp_path / "none")
+    assert "no such folder" in said and "warpdribble learn SKILL --out RUN learns one" in said
+    said = refused(capsys, command, tmp_path)
+    assert "holds no run; give a folder that warpdribble learn wrote" in said
+
+
+@pytest.mark.parametrize("command", ["evaluate", "export"])
+def test_a_stage_that_was_not_learned(run, capsys, command):
+    said = refused(capsys, command, run, "--stage", "ball")
+    assert f"{run}: there is no stage 'ball'; there are locomotion; give another --stage" in said
+
+
+def test_the_number_of_workers_does_not_matter(run, small, capsys, tmp_path):
+    """The same policy, to the bit."""
+    out = tmp_path / "run"
+    assert main(["learn", NAME, "--out", str(out), "--workers", "3"]) == 0
+    for name in ("policy.npz", "checkpoint.npz"):
+        with np.load(run / "locomotion" / name) as one, np.load(out / "locomotion" / name) as two:
+            for key in set(one.files) - {"seconds"}:
+                np.testing.assert_array_equal(one[key], two[key], err_msg=key)
+
+
+def test_a_folder_that_is_being_written_is_refused(run, capsys):
+    from warpdribble.learning.runs.files import held
+
+    with held(run):
+        said = refused(capsys, "learn", NAME, "--out", run, "--iterations", "9", late=True)
+    line = said.splitlines()[-1]
+    assert re.search(r"is being written by process \d+ on \S+ since [-\d: ]+: wait until it is done; ", line)
+    assert line.endswith("give another --out")
+
+
+def test_another_seed_is_another_run(run, capsys):
+    said = refused(capsys, "learn", NAME, "--out", run, "--seed", "4")
+    assert "holds another run: seed is 0 there and 4 here; give another --out" in said
+
+
+def test_a_damaged_checkpoint_is_said(run, capsys, tmp_path):
+    import shutil
+
+    shutil.copytree(run, tmp_path / "run")
+    (tmp_path / "run" / "locomotion" / "checkpoint.npz").write_bytes(b"PK half")
+    said = refused(capsys, "learn", NAME, "--out", tmp_path / "run", "--iterations", "9", late=True)
+    assert "checkpoint.npz: is damaged" in said
+    assert said.endswith("delete it to learn from the start; give another --out\n")
 
 
 def test_a_cycle_that_is_too_short_is_said(tmp_path, cmu_clip):
