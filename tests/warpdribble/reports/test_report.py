@@ -1,5 +1,8 @@
 """Measured parts of pages: what is between the markers is replaced, and says what was measured."""
 
+import json
+import shutil
+
 import pytest
 
 from warpdribble.reports.locomotion import tables
@@ -53,6 +56,45 @@ def test_a_page_without_markers_is_refused(tmp_path):
     page.write_text(f"{BEGIN} but no end")
     with pytest.raises(SystemExit, match="no markers"):
         check_page(page)
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Trials and pushes that take a second."""
+    from warpdribble.learning.evaluate import pushes
+    from warpdribble.reports import locomotion
+
+    for name, value in (("TRIALS", 4), ("CYCLES", 2), ("PLAYERS", 16)):
+        monkeypatch.setattr(locomotion, name, value)
+    monkeypatch.setattr(pushes, "FORCES", (50, 2000))
+
+
+def test_runs_are_measured(tmp_path, few):
+    """Tables and curves; what was measured once is kept; runs in folders of their own follow."""
+    from warpdribble.assets import path as asset
+    from warpdribble.reports.locomotion import MEASURED, main
+
+    page, runs = tmp_path / "docs" / "page.md", tmp_path / "runs"
+    page.parent.mkdir()
+    page.write_text(f"{BEGIN}\n{END}\n")
+    places = [runs / "one", runs / "other-seeds" / "two"]
+    for place in places:
+        shutil.copytree(asset("controllers") / "dribble-right-authored", place)
+        head = "iteration,survived,samples_per_second,outside,seconds"
+        rows = ("1,nan,1000,0.25,1.5", "2,0.5,3000,0.15,3.5")
+        (place / "locomotion" / "progress.csv").write_text("\n".join((head, *rows)) + "\n")
+    main(runs, page)
+    text = page.read_text()
+    name = "dribble-right-authored"
+    row = f"| {name}: (B) dribbling in place, right hand, authored | 0.70 | 4 | 4 | 4 | 2 k | 20 % |"
+    assert text.count(row) == 2 and "### Other seeds" in text
+    assert text.count(f"| {name} | {' | '.join(['50'] * 8)} |") == 2
+    assert (page.parent / "pictures" / "locomotion-curves.png").stat().st_size > 5000
+    kept = json.loads((places[0] / MEASURED).read_text())
+    assert kept["iterations"] == 80 and kept["open seconds"] > 0.0
+    (places[0] / MEASURED).write_text(json.dumps(kept | {"survived": 77}))
+    main(runs, page)
+    assert page.read_text() == text.replace(row, row.replace("| 4 | 4 | 4 |", "| 77 | 4 | 4 |"), 1)
 
 
 def test_the_sheets_are_drawn(tmp_path):
