@@ -30,19 +30,20 @@ class Block:
 
 
 @wp.func_native(f"""
-int base[{LANES}], some = 0;
+int moved[{LANES}], base[{LANES}], count = 0;
 for (int lane = 0; lane < {LANES}; ++lane) {{
     int w = g * {LANES} + lane, last = rows.shape[0] - 1, row = rows.data[w < last ? w : last];
-    base[lane] = row < 0 ? -1 : source.start + row / source.lanes * source.group_stride + row % source.lanes;
-    some |= row >= 0;
+    if (row >= 0) {{
+        base[count] = source.start + row / source.lanes * source.group_stride + row % source.lanes;
+        moved[count++] = lane;
+    }}
 }}
-for (int i = 0; i < (some ? to.n : 0); ++i)
+for (int i = 0; count && i < to.n; ++i)
     for (int k = 0; k < to.parts; ++k) {{
         float *here = state.data + to.start + g * to.group_stride + i * to.stride + k * {LANES};
         const float *there = pool.data + i * source.stride + k * source.lanes;
-        for (int lane = 0; lane < {LANES}; ++lane)
-            if (base[lane] >= 0)
-                here[lane] = source.n > 0 ? there[base[lane]] : 0.0f;
+        for (int c = 0; c < count; ++c)
+            here[moved[c]] = source.n > 0 ? there[base[c]] : 0.0f;
     }}
 """)
 def move(

@@ -202,11 +202,11 @@ def select(E: np.ndarray, keep: float) -> tuple[np.ndarray, np.ndarray]:
     (islands,) have none left; E: costs (islands, particles). The best `keep` of an island stay; the others
     become copies of them, of the best first."""
     islands, particles = E.shape
-    order = np.argsort(E, axis=1, kind="stable")
+    own, order = np.arange(islands)[:, None], np.argsort(E, axis=1, kind="stable")
     alive = np.minimum(np.isfinite(E).sum(axis=1), max(1, round(keep * particles)))
     child = np.arange(particles) % np.maximum(alive, 1)[:, None]
     parent = np.empty((islands, particles), int)
-    np.put_along_axis(parent, order, np.take_along_axis(order, child, axis=1), axis=1)
+    parent[own, order] = order[own, child]
     return parent, alive == 0
 
 

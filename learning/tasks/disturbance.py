@@ -50,15 +50,17 @@ class Disturber:
     def apply(self, task: Follow) -> None:
         """Set the forces and the arms' offsets of the coming fragment."""
         what, streams, period = self.what, self.streams, task.graph.period
+        if not (what.push or what.hands or what.arms):
+            return
+        even, normal = streams.uniform(6), streams.normal(6 + task.course.columns - task.actions)
         if what.push:
-            self._push(streams.uniform(3), period)
+            self._push(even[:, :3], period)
         if what.hands:
-            self._pull(streams.uniform(3), streams.normal(2, 3), period)
+            self._pull(even[:, 3:], normal[:, :6].reshape(-1, 2, 3), period)
         if what.push or what.hands:
             task.course.push[:] = streams.worlds(self._forces)
         if what.arms:
-            arms = what.arms * streams.normal(task.course.columns - task.actions)
-            task.course.offset[:, task.actions :] = streams.worlds(arms)
+            task.course.offset[:, task.actions :] = streams.worlds(what.arms * normal[:, 6:])
 
     def _push(self, drawn: np.ndarray, period: float) -> None:
         """drawn (count, 3): whether a push begins, from where, how hard."""
