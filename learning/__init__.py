@@ -1,6 +1,18 @@
-"""Learning to move and to dribble.
+"""Learning to move and to dribble. Public names stand here; what is deeper may move.
 
-Public names stand here; what is deeper may move.
+The papers' letters (P1: Liu and Hodgins 2018, with Liu et al. 2016 for locomotion), and where they are:
+
+| letter | here | meaning |
+|---|---|---|
+| C_k, m_k | `graph.ControlGraph` | a control fragment of 0.05 s, and its piece of motion |
+| pi_k, M_k, a_hat_k, sigma_k | `LinearPolicy` | the policy of a fragment, a = M_k s + a_hat_k (Eq. 4) |
+| s | `obs`, `Task.observe` | the reduced state that a policy sees at a fragment's start |
+| a | `action`, `Course.offset` | what turns the drives' targets throughout a fragment |
+| E | `cost`, `Task.judge` | what a fragment cost |
+| w | `methods.samcon.Moments` | descendants of an action, its weight in the regression |
+| N_s, n_save | `SamconConfig.particles`, `keep` | samples of a fragment, and how many of them go on |
+| H | `sims.Ball.touch` | when which hand has the ball, the soft set |
+| h_ref | `sims.Ball.heights` | the ball's height at each of its `checkpoints` (Eq. 8) |
 """
 
 from typing import TYPE_CHECKING
