@@ -8,6 +8,7 @@
         checkpoint.npz   the learner's state
         policy.npz       its best result so far, and states to start it from
         progress.csv     a row per iteration, and the same in tensorboard/
+        needs-*.npz      results of other stages that it started from, as they were then
 
 Every file is replaced as a whole, the checkpoint last: stopped at any moment, learning goes on as if it had
 not been.
@@ -114,6 +115,9 @@ class Run:
         """For a learner of a stage. Raises InputError where a stage that it needs has not been learned."""
         folder, needs = self.folder / stage.name, {}
         for need in stage.needs:
+            if (kept := self.stage(stage).need(need)).exists():
+                needs[need] = read_arrays(kept, RESULT_REMEDY)
+                continue
             if not (self.folder / need / RESULT).exists():
                 reason = f"{stage.name} starts from what {need} has learned, and there is nothing yet"
                 raise InputError(reason, self.folder, "needs")
@@ -206,8 +210,15 @@ class StageFolder:
         self.path.mkdir(exist_ok=True)
         sweep(self.path)
 
-    def begin(self, config: Any) -> None:
-        """Keep the parameters."""
+    def need(self, name: str) -> Path:
+        """Where the result of another stage is kept, as it was when this one began: it may be learned on."""
+        return self.path / f"needs-{name}.npz"
+
+    def begin(self, config: Any, needs: Mapping[str, Arrays]) -> None:
+        """Keep the parameters, and the results that it starts from."""
+        for name, arrays in needs.items():
+            if not self.need(name).exists():
+                write_arrays(self.need(name), arrays)
         write_json(self.path / CONFIG, plain(config))
 
     def restore(self, learner: Learner) -> float:

@@ -50,7 +50,8 @@ def train(
         seconds = folder.restore(learner)
         if made:
             made(learner, config)
-        folder.begin(replace(config, iterations=max(config.iterations, learner.iteration)))
+        config = replace(config, iterations=max(config.iterations, learner.iteration))
+        folder.begin(config, context.needs)
         return _train(folder, stage, learner, seconds, progress)
 
 

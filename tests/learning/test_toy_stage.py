@@ -63,6 +63,7 @@ def test_it_is_learned_beside_what_it_stands_on(learned):
     assert sorted(p.name for p in (learned / "toy").iterdir()) == [
         "checkpoint.npz",
         "config.json",
+        "needs-locomotion.npz",
         "policy.npz",
         "progress.csv",
         "tensorboard",
@@ -73,6 +74,18 @@ def test_it_is_learned_beside_what_it_stands_on(learned):
     assert one.stage is TOY and one.iteration == 30
     assert isinstance(one.controller, LegsAndArms) and isinstance(one.task(2), Armed)
     assert one.controller.arms.any() and one.task(2).actions > 11
+
+
+def test_it_keeps_what_it_stood_on(learned, tmp_path):
+    """Locomotion that is learned on afterwards changes neither what goes on nor what is tried."""
+    run = tmp_path / "run"
+    shutil.copytree(learned, run)
+    policy = run / "locomotion" / "policy.npz"
+    with np.load(policy) as file:
+        other = {name: file[name] for name in file.files}
+    np.savez(policy, **other | {"a_hat": other["a_hat"] + 0.1})
+    legs = Run.load(run).learned(STAGES).controller.legs
+    np.testing.assert_array_equal(legs.a_hat, other["a_hat"])
 
 
 def test_killed_it_goes_on_by_the_same_command_to_the_same_bits(learned, tmp_path):
