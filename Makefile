@@ -7,6 +7,8 @@ EXTRAS ?= dev,learn
 PY     := $(VENV)/bin/python
 BARE   := $(VENV)/.stamp-
 STAMP  := $(BARE)$(EXTRAS)
+# A worker fills a core. It takes whole files, whose tests share what is dear to make.
+TEST   := $(PY) -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 WHAT    = -q -c constraints.txt -e '.$(patsubst %,[%],$(@:$(BARE)%=%))'
 
 .DEFAULT_GOAL := setup
@@ -26,10 +28,10 @@ demo: $(or $(wildcard $(STAMP)),$(BARE))
 	$(PY) -m warpdribble demo
 
 test: $(STAMP)
-	$(PY) -m pytest -q -m "not slow"
+	$(TEST) -m "not slow"
 
 test-all: $(STAMP)
-	$(PY) -m pytest -q
+	$(TEST)
 
 bench: $(STAMP)
 	$(PY) -m warpdribble bench step --worlds 256 --against mujoco
