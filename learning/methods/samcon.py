@@ -438,9 +438,6 @@ def make(context: Context) -> Samcon:
         return Locomotion(model, context.graph, worlds, context.device, threads, c.weights)
 
     tasks = [task(c.particles * islands) for islands in shares(c.islands, count)]
-    first = tasks[0]  # a kernel's first call is made here, as Warp does not make it for several threads
-    first.advance(np.zeros(first.worlds, int), np.zeros((first.worlds, first.actions)))
-    first.become(np.zeros(first.worlds, int))
     return Samcon(tasks, [task(c.trials) for _ in range(min(count, TRIED))], c, context.seed)
 
 

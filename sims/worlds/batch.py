@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -42,6 +43,19 @@ def find_device(name: str) -> wp.Device:
         raise ValueError(f"no device {name!r} here; there are: {there}") from None
 
 
+_LOADED: set[tuple[ModuleType, str]] = set()
+_LOADING = threading.Lock()
+
+
+def _load(program: ModuleType, device: wp.Device) -> None:
+    """Compile and load kernels, once in a process: to load them again would take away the code that another
+    thread may be running."""
+    with _LOADING:
+        if (program, device.alias) not in _LOADED:
+            program.load(device)
+            _LOADED.add((program, device.alias))
+
+
 class Batch:
     """Worlds in groups of `lanes`: a group is what one pass of a kernel steps.
 
@@ -66,7 +80,6 @@ class Batch:
         self.groups = -(-world_count // self.lanes)
         self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
-        self._loaded: set[ModuleType] = set()
         self._tree = self._make_tree()
         self._tree_version = 0
         self._world = self._make_world()
@@ -271,9 +284,7 @@ class Batch:
         """What launches a kernel, to be called many times: arguments are packed once. What the arrays among
         the inputs hold may change, the inputs not."""
         function, size = getattr(program, kernel), -(-self.groups // self.threads)
-        if program not in self._loaded:
-            program.load(self.device)  # before threads launch it
-            self._loaded.add(program)
+        _load(program, self.device)
         commands: list[wp.Launch] = []
         tree = -1
 
