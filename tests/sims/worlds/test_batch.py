@@ -1,4 +1,4 @@
-"""Kernels are loaded once in a process, whoever asks: loading them again takes away code that may be running."""
+"""Kernels are loaded once in a process, whoever asks: a second time takes away code that may be running."""
 
 import subprocess
 import sys
@@ -49,6 +49,6 @@ def test_threads_that_ask_at_once_load_once():
 
 @pytest.mark.slow
 def test_first_steps_of_two_threads_at_once():
-    """In fresh processes, where kernels are not loaded yet: before, two of 25 ended in a segmentation fault."""
+    """In fresh processes, where kernels are not loaded yet: two of 25 used to end in a segmentation fault."""
     for _ in range(12):
         assert subprocess.run([sys.executable, "-c", AT_ONCE], cwd=ROOT).returncode == 0
