@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import tyro
@@ -82,6 +82,9 @@ class Result:
     """[rad/s], see `ours.solver_error`"""
     peers: dict[str, dict[str, float | None]] = field(default_factory=dict)
     """setting -> steps_per_second, contacts, velocity_error, ratio"""
+
+
+COMMANDS: dict[str, Any] = {"step": Step, "solve": Solve, "reset": Reset}
 
 
 def processor() -> str:
@@ -194,7 +197,7 @@ def print_solve(rows: list[dict[str, float]]) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     options: Step | Solve | Reset = tyro.extras.subcommand_cli_from_dict(
-        {"step": Step, "solve": Solve, "reset": Reset}, args=arguments, prog="warpdribble bench"
+        COMMANDS, args=arguments, prog="warpdribble bench"
     )
     if isinstance(options, Step):
         result = step(options)

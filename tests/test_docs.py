@@ -185,9 +185,9 @@ def commands():
 
     if "bench" in COMMANDS:
         return COMMANDS
-    from warpdribble.benchmarks.command import Solve, Step
+    from warpdribble.benchmarks import command
 
-    return COMMANDS | {"bench step": Step, "bench solve": Solve}
+    return COMMANDS | {f"bench {name}": bench for name, bench in command.COMMANDS.items()}
 
 
 def parse(arguments):
