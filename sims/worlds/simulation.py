@@ -250,14 +250,11 @@ class Simulation(Batch):
 
     def step(self, count: int = 1) -> None:
         """Advance all worlds by `count` steps of `model.timestep`."""
-        self.advance(count, self._program.Course(), self._program.Watch())
-
-    def advance(self, count: int, course: Any, watch: Any) -> None:
-        """The same along a `Course`, watched by a `Watch`, both of the kernels."""
-        self.advancing(count, course, watch)()
+        self.advancing(count, self._program.Course(), self._program.Watch())()
 
     def advancing(self, count: int, course: Any, watch: Any) -> Callable[[], None]:
-        """What does that, to be called many times."""
+        """What does the same along a `Course`, watched by a `Watch`, both of the kernels; to be called many
+        times."""
         launch = self.prepared(self._program, "step", [count, course, watch])
 
         def advance() -> None:
