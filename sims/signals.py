@@ -47,6 +47,15 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return np.concatenate([quaternions[:1], quaternions[1:] * sign[..., None]])
 
 
+def low_pass_rotations(quaternions: np.ndarray, rate: float, cut_off: float) -> np.ndarray:
+    """The same for unit quaternions (frames, ..., 4): filtered with continuous signs in the four dimensions
+    they live in, and put back on the sphere, so that any number of turns stays what it is."""
+    if not quaternions.size:
+        return quaternions
+    filtered = low_pass(continuous(quaternions), rate, cut_off)
+    return filtered / np.linalg.norm(filtered, axis=-1, keepdims=True)
+
+
 def interpolate_lines(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Linear interpolation of values (frames, ...) at fractional frame numbers `at` (n,)."""
     low, share = _bracket(len(values), at)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..signals import continuous, interpolate_lines, interpolate_rotations, low_pass
+from ..signals import interpolate_lines, interpolate_rotations, low_pass, low_pass_rotations
 from . import anatomy, defects
 from .motion import RECORDED, Motion
 from .stance import stance
@@ -85,7 +85,7 @@ def toes(motion: Motion) -> tuple[Motion, str]:
     found = anatomy.parts(motion.joint_names, motion.parents)
     joints = [found[f"{side}_toe"] for side in anatomy.SIDES if f"{side}_toe" in found]
     rotations = motion.rotations.copy()
-    rotations[:, joints] = smooth(rotations[:, joints], motion.rate, TOE_CUT_OFF)
+    rotations[:, joints] = low_pass_rotations(rotations[:, joints], motion.rate, TOE_CUT_OFF)
     change = _largest_turn(motion.rotations[:, joints], rotations[:, joints])
     said = f"low-pass {TOE_CUT_OFF:g} Hz, changed by up to {change:.1f} degrees"
     return replace(motion, rotations=rotations), said if joints else "no toe joints"
@@ -94,7 +94,7 @@ def toes(motion: Motion) -> tuple[Motion, str]:
 def lowpass(motion: Motion) -> tuple[Motion, str]:
     """Low-pass all rotations, the root's place and recorded joint positions; a recorded ball stays, as its
     bounces are sharp."""
-    rotations = smooth(motion.rotations, motion.rate, CUT_OFF)
+    rotations = low_pass_rotations(motion.rotations, motion.rate, CUT_OFF)
     positions = motion.positions
     if positions is not None:
         positions = low_pass(positions, motion.rate, CUT_OFF)
@@ -121,14 +121,6 @@ def ground(motion: Motion) -> tuple[Motion, str]:
 
 
 STEPS = {"spikes": spikes, "toes": toes, "lowpass": lowpass, "ground": ground}
-
-
-def smooth(rotations: np.ndarray, rate: float, cut_off: float) -> np.ndarray:
-    """Low-pass filter of rotations (frames, ..., 4) xyzw, forward and backward."""
-    if not rotations.size:
-        return rotations
-    filtered = low_pass(continuous(rotations), rate, cut_off)
-    return filtered / np.linalg.norm(filtered, axis=-1, keepdims=True)
 
 
 def _off_rotations(quaternions: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from ..model import Model, pose
 from ..recording.motion import Motion
 from ..reference.reference import Reference
-from ..signals import low_pass
+from ..signals import low_pass_rotations
 from .calibrate import match_limbs, rest_by_directions, since_rest
 from .mapping import Mapping, find_mapping
 from .planting import Foot, Stand, find_foot, find_stands, planted, sole_heights
@@ -177,7 +177,8 @@ def _body_rotations(
         if body in mapping.palms:
             turned[body] = _palm(model, body, [positions[:, motion.index(j)] for j in mapping.palms[body]])
         if body in mapping.smoothed:
-            turned[body] = _smooth(turned[body], mapping.smoothed[body], motion.rate)
+            soft = low_pass_rotations(turned[body].as_quat(), motion.rate, mapping.smoothed[body])
+            turned[body] = Rotation.from_quat(soft)
     return turned
 
 
@@ -223,11 +224,3 @@ def _root(
     facing = turned[model.body_names[root]]
     position = middle - facing.apply(zero[hips, :3].mean(axis=0) - zero[root, :3])
     return np.concatenate([position, facing.as_quat()], axis=1)
-
-
-def _smooth(turns: Rotation, cut_off: float, rate: float) -> Rotation:
-    """Low-pass filter of rotations, forward and backward so that nothing is delayed."""
-    middle = turns.mean()
-    steps = (middle.inv() * turns).as_rotvec()
-    filtered = low_pass(steps, rate, cut_off)
-    return turns if filtered is steps else middle * Rotation.from_rotvec(filtered)

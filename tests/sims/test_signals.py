@@ -11,6 +11,7 @@ from warpdribble.sims.signals import (
     interpolate_lines,
     interpolate_rotations,
     low_pass,
+    low_pass_rotations,
     runs,
     smoothstep,
     speed,
@@ -78,6 +79,24 @@ def test_what_cannot_be_filtered_is_returned():
     assert low_pass(values, 120.0, 6.0) is values
     long = np.tile(values, (9, 1))
     assert low_pass(long, 12.0, 6.0) is long and low_pass(long, 20.0, 6.0) is not long
+
+
+def test_a_low_pass_keeps_a_spin_of_many_turns():
+    spin = Rotation.from_rotvec(np.linspace(0, 6 * np.pi, 240)[:, None] * [0.0, 0.0, 1.0])
+    soft = Rotation.from_quat(low_pass_rotations(spin.as_quat(), 120.0, 6.0))
+    assert (soft.inv() * spin).magnitude()[30:-30].max() < 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_a_low_pass_does_not_depend_on_signs_or_on_the_frame(seed):
+    random = np.random.default_rng(seed)
+    path = Rotation.from_rotvec(np.cumsum(random.normal(scale=0.1, size=(80, 3)), axis=0))
+    left, right = Rotation.random(2, random_state=seed)
+    signs = random.choice([-1.0, 1.0], size=(80, 1))
+    filtered = Rotation.from_quat(low_pass_rotations(path.as_quat() * signs, 120.0, 6.0))
+    turned = Rotation.from_quat(low_pass_rotations((left * path * right).as_quat(), 120.0, 6.0))
+    assert (turned.inv() * (left * filtered * right)).magnitude().max() < 1e-6
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.sims.retarget.person import about, person
 from warpdribble.clips.bvh import read_bvh
 from warpdribble.clips.read import read_clip
 from warpdribble.sims import Model
@@ -223,3 +224,16 @@ def test_a_t_pose_is_built_from_directions(player, dribble):
         assert apart.mean() < 0.05, body
     plain = pose.forward(player, retarget(player, lying, read_mapping("cmu"), ik=False).joint_q)
     assert np.linalg.norm((ours - plain)[:, player.body("head"), :3], axis=1).mean() > 0.2
+
+
+@pytest.mark.parametrize("turns", [3.0, -3.0])
+def test_hands_stay_on_through_three_full_turns(player, turns):
+    """Hands are low-passed, and their heading passes half a turn: they still only turn with the body."""
+    frames = 361
+    angle = 2.0 * np.pi * turns * np.arange(frames) / (frames - 1)
+    joint_q = retarget(player, person(player, frames, turns={"Hips": about("z", angle)})).joint_q
+    body_q = pose.forward(player, joint_q)
+    steady = 2.0 * np.pi * abs(turns) / (len(joint_q) - 1)
+    for hand in player.roles.hands:
+        turn = Rotation.from_quat(body_q[:, player.body(hand), 3:])
+        assert (turn[:-1].inv() * turn[1:]).magnitude()[10:-10] == pytest.approx(steady, rel=0.02)
