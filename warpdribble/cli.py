@@ -1,6 +1,7 @@
 """The command line: `warpdribble simulate`, `warpdribble demo`, `warpdribble bench`, ...
 
-Whatever is wrong with the input ends in one line on stderr that says what to do, and exit status 2.
+Whatever is wrong with the input ends in one line on stderr that says what to do, and exit status 2. Where
+nobody reads on, as behind `| head`, a command ends without a word, as others do.
 """
 
 from __future__ import annotations
@@ -17,21 +18,36 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
 from .commands import COMMANDS, Command
+from .commands.console import hang_up
 from .commands.hints import HINTS, one_line
 
 ABOUT = "Recorded motion becomes a simulated basketball player. Also: warpdribble bench."
 CHOICES: Any = reduce(or_, (Annotated[command, subcommand(name)] for name, command in COMMANDS.items()))
 
 
+UNHEARD = 128 + 13
+"""Exit status, as a shell says it, of a program that SIGPIPE ends: whoever read its output has gone."""
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
-    arguments = sys.argv[1:] if arguments is None else list(arguments)
-    if arguments[:1] == ["bench"]:
-        return _bench(arguments[1:])
     try:
-        return _parse(arguments).run()
+        status = _run(sys.argv[1:] if arguments is None else list(arguments))
+        sys.stdout.flush()
+    except BrokenPipeError as error:
+        return UNHEARD if hang_up() else _complain(one_line(error))
+    return status
+
+
+def _run(arguments: list[str]) -> int:
+    try:
+        return _bench(arguments[1:]) if arguments[:1] == ["bench"] else _parse(arguments).run()
     except SystemExit as stop:
+        if stop.code == 1 and hang_up():  # rich makes this of a broken pipe
+            return UNHEARD
         return stop.code if isinstance(stop.code, int) else 2
+    except BrokenPipeError:
+        raise
     except (ValueError, OSError) as error:
         return _complain(one_line(error))
     except FloatingPointError as error:

@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -161,3 +162,34 @@ def test_the_module_runs_as_a_program(tmp_path):
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr == "warpdribble: nowhere.bvh: no such file\n"
+
+
+@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize("arguments", [("skill", "list"), ("simulate", "--help"), ("bench", "--help")])
+def test_where_nobody_reads_on_a_command_ends_without_a_word(arguments, both):
+    """As behind `| head`, and `2>&1 | head`: the status is a shell's for SIGPIPE."""
+    unread, pipe = os.pipe()
+    os.close(unread)
+    command = [sys.executable, "-m", "warpdribble", *arguments]
+    stderr = pipe if both else subprocess.PIPE
+    done = subprocess.run(command, cwd=ROOT, stdout=pipe, stderr=stderr, text=True, check=False)
+    os.close(pipe)
+    assert (done.returncode, done.stderr or "") == (141, "")
+
+
+def test_a_mistake_is_said_and_counts_though_nobody_reads_the_output():
+    unread, pipe = os.pipe()
+    os.close(unread)
+    command = [sys.executable, "-m", "warpdribble", "fly"]
+    done = subprocess.run(command, cwd=ROOT, stdout=pipe, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(pipe)
+    assert done.returncode == 2 and "--help" in done.stderr
+
+
+def test_a_pipe_that_is_not_the_output_is_said(capsys, monkeypatch):
+    def broken(self):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr("warpdribble.commands.skill.List.run", broken)
+    assert main(["skill", "list"]) == 2
+    assert capsys.readouterr().err == "warpdribble: [Errno 32] Broken pipe\n"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import re
+import select
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from ..learning.tasks.follow import Follow
@@ -25,6 +27,26 @@ class Progress(Protocol):
 def say(line: str) -> None:
     """A line of the report, at once even through a pipe."""
     print(line, flush=True)
+
+
+def hang_up() -> bool:
+    """Whether nobody reads stdout or stderr any more; what is still to be written to either goes nowhere."""
+    gone = [stream for stream in (sys.stdout, sys.stderr) if _unread(stream)]
+    for stream in gone:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+    return bool(gone)
+
+
+def _unread(stream: TextIO) -> bool:
+    """Whether a stream is a pipe whose other end is closed."""
+    try:
+        watch = select.poll()
+        watch.register(stream.fileno(), 0)
+    except (AttributeError, OSError, ValueError):  # no such thing here, or no file behind the stream
+        return False
+    return any(event & select.POLLERR for _, event in watch.poll(0))
 
 
 @contextlib.contextmanager
