@@ -27,6 +27,8 @@ class Accuracy:
     """Limb -> mean and 95th percentile of its joints' distance from the recording."""
     mean: float
     """Over all joints and frames."""
+    worst: tuple[str, float]
+    """The body whose joint is farthest from the recording on average, and that distance."""
     sliding: float
     """[m/s], mean horizontal speed of standing feet: of the slowest of the sole's points that touch the
     ground, as a foot that rolls or pivots has one at rest."""
@@ -46,6 +48,12 @@ class Accuracy:
     limits: float
     """[rad] farthest that any joint is beyond its range."""
 
+    @property
+    def summary(self) -> str:
+        """Mean and worst joint in words."""
+        body, far = self.worst
+        return f"{100 * self.mean:.1f} cm from the recording, the worst {100 * far:.1f} cm ({body})"
+
 
 def accuracy(model: Model, result: Retargeted) -> Accuracy:
     joint_q = result.reference.joint_q
@@ -54,6 +62,8 @@ def accuracy(model: Model, result: Retargeted) -> Accuracy:
         body: np.linalg.norm(body_q[:, model.body(body), :3] - goal, axis=1)
         for body, goal in result.goals.items()
     }
+    means = {body: float(error.mean()) for body, error in errors.items()}
+    worst = max(means, key=means.__getitem__)
     limbs = {}
     for limb, bodies in _limbs(model, result.mapping).items():
         apart = [error for body, error in errors.items() if body in bodies]
@@ -81,6 +91,7 @@ def accuracy(model: Model, result: Retargeted) -> Accuracy:
     return Accuracy(
         limbs=limbs,
         mean=float(np.mean(list(errors.values()))),
+        worst=(worst, means[worst]),
         sliding=float(slide.mean()),
         sliding_all=float(every.mean()) if len(every) else 0.0,
         sliding_worst=float(np.quantile(slide, 0.99)),

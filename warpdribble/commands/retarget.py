@@ -95,7 +95,7 @@ class Cycles(ClipInput):
 
 
 def _table(fit: Accuracy) -> list[str]:
-    lines = [f"joints      {100 * fit.mean:.1f} cm from the recording; mean and 95 % by limb:"]
+    lines = [f"joints      {fit.summary}; mean and 95 % by limb:"]
     for limb, (mean, most) in fit.limbs.items():
         lines.append(f"  {limb:10}{100 * mean:5.1f} {100 * most:5.1f} cm")
     lines.append(

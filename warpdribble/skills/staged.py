@@ -23,6 +23,7 @@ from ..sims.errors import InputError
 from ..sims.model import Model
 from ..sims.reference.mirror import mirrored
 from ..sims.reference.reference import Cycle, Reference, close_cycle, closing
+from ..sims.retarget.accuracy import accuracy
 from ..sims.retarget.mapping import MappingError, find_mapping, read_mapping
 from ..sims.retarget.reach import lift_out
 from ..sims.retarget.retarget import retargeted
@@ -151,6 +152,7 @@ def _recorded(
         ball = recorded_ball(model, result, motion)
         if ball is None or not ball.touch.any():
             ball = inferred_ball(model, result.reference)
+    notes = [*notes, f"joints {accuracy(model, result).summary}"]
     return result.reference, ball, notes
 
 

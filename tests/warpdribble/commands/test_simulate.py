@@ -85,6 +85,15 @@ def test_a_clip_is_a_skill_that_has_no_file_yet(simulated, tmp_path, cmu_clip):
     assert any(note.startswith("repair ground: ") for note in notes(clip))
 
 
+def test_the_error_of_the_retargeting_is_said(simulated, capsys, cmu_clip):
+    """The same as `motion retarget` says: mean and worst joint."""
+    said, _ = simulated(cmu_clip)
+    assert main(["motion", "retarget", str(cmu_clip)]) == 0
+    error = re.search(r"^joints +(.*);", capsys.readouterr().out, re.MULTILINE)[1]
+    assert re.fullmatch(r"\d+\.\d cm from the recording, the worst \d+\.\d cm \(\w+\)", error)
+    assert f"joints {error}" in notes(said)
+
+
 def test_an_inferred_ball_is_said(simulated, tmp_path, mocap):
     """Also of a clip whose ends are made to meet; the same bits again."""
     path = mocap / "cmu" / "06_12.bvh"
