@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .drives import read_drives
 from .joints import DOF_SIZE, HINGE, Q_SIZE
 from .mjcf import (
     GEOMS,
     JOINTS,
-    check_supported,
     compile_mjcf,
-    read_drives,
     read_inertia,
     read_links,
     read_shapes,
     xyzw,
 )
 from .slots import build_slots
+from .supported import check_supported
 
 if TYPE_CHECKING:
     import mujoco
@@ -31,10 +31,10 @@ def read_model(
 ) -> dict[str, Any]:
     """The fields of the `Model` of a file; see `Model.load`."""
     m, keys, gone = compile_mjcf(path, rigid, pose, without)
-    check_supported(m, path)
+    notes = check_supported(m, path)
     t, bodies = read_links(m)
     inertia = read_inertia(m, **bodies, link_count=len(t.link_parent))
-    kp, kd, notes = read_drives(m, t, path)
+    drives = read_drives(m, t, path)
     shapes = read_shapes(m)
     geoms = [g for g in range(m.ngeom) if int(m.geom_type[g]) in GEOMS]
     links = {
@@ -51,10 +51,10 @@ def read_model(
         "body_link": bodies["body_link"][1:],
         "body_offset": bodies["body_offset"][1:],
         "body_turn": bodies["body_turn"][1:],
-        "dof_kp": kp,
-        "dof_kd": kd,
-        "dof_armature": m.dof_armature.copy(),
-        "dof_damping": m.dof_damping.copy(),
+        "dof_kp": drives.kp,
+        "dof_kd": drives.kd,
+        "dof_armature": drives.armature,
+        "dof_damping": drives.damping,
         "dof_stiffness": stiffness,
         "pair_erp": np.array([p["erp"] for p in pairs]),
         "pair_cfm": np.array([p["cfm"] for p in pairs]),
@@ -93,7 +93,7 @@ def read_model(
         "start_q": keyframes.get("start", _order(m, m.qpos0)).copy(),
         "tables": tables,
         "pairs": pairs,
-        "notes": notes,
+        "notes": notes + drives.notes,
     }
 
 

@@ -1,8 +1,7 @@
 """Reads an MJCF file, with MuJoCo's own compiler, into the tables that the kernels step.
 
-Any tree of free, ball and hinge joints with capsules, boxes, spheres and planes loads. Position
-actuators become stable PD drives, joint damping and stiffness passive ones. What cannot be simulated
-is refused by name rather than left out.
+Any tree of free, ball and hinge joints with capsules, boxes, spheres and planes loads. `drives` reads the
+actuators. What cannot be simulated is refused by name rather than left out: `fields` and `supported`.
 """
 
 from __future__ import annotations
@@ -24,6 +23,8 @@ JOINTS = {0: FREE, 1: BALL, 3: HINGE}
 """MuJoCo's joint types, but for the slide, which is not simulated."""
 GEOMS = {0: "plane", 2: "sphere", 3: "capsule", 6: "box"}
 """MuJoCo's geom types that are simulated."""
+USER = (0.0, 0.2, 1.0e-5)
+"""What a geom's user numbers are where a file does not give them: restitution, erp, cfm."""
 ANYWHERE = 1.0e9
 """Effort limit [N m] of a joint that has none."""
 
@@ -105,6 +106,7 @@ def compile_mjcf(
     try:
         path.read_text(encoding="utf-8")  # MuJoCo takes other bytes as names, and cannot say them
         spec = mujoco.MjSpec.from_file(str(path))
+        _fill_user(spec, path)
         model = spec.compile()
         keys = {model.key(k).name: _by_joint(model, model.key_qpos[k]) for k in range(model.nkey)}
         bodies = {model.body(b).name for b in range(model.nbody)}
@@ -130,6 +132,21 @@ def compile_mjcf(
         reason = " ".join(str(error).split())
         raise ModelError(f"{path}: not a valid MJCF file: {reason}") from None
     return model, keys, bodies - {model.body(b).name for b in range(model.nbody)}
+
+
+def _fill_user(spec: mujoco.MjSpec, path: Path) -> None:
+    """Give every geom the user numbers that it does not say: MuJoCo itself would pad with zeros."""
+    for geom in spec.geoms:
+        given = list(geom.userdata)
+        user = given + list(USER)[len(given) :]
+        if not (0 <= user[0] <= 1 and 0 <= user[1] <= 1 and user[2] >= 0):
+            said = " ".join(f"{number:g}" for number in given)
+            raise ModelError(
+                f"{path}: user '{said}' of geom '{geom.name}' is not restitution, erp (0 to 1 each) and cfm"
+            )
+        geom.userdata = user
+    if spec.nuser_geom >= 0:
+        spec.nuser_geom = max(spec.nuser_geom, len(USER))
 
 
 def _by_joint(m: mujoco.MjModel, qpos: np.ndarray) -> dict[str, np.ndarray]:
@@ -178,69 +195,6 @@ def _freeze(
         spec.delete(joint)
 
 
-def check_supported(m: mujoco.MjModel, path: str | Path) -> None:
-    """Raise ModelError naming the first thing in a compiled model that is not simulated."""
-
-    def refuse(what: str, advice: str) -> None:
-        raise ModelError(f"{path}: {what} is not supported; {advice}")
-
-    for j in range(m.njnt):
-        if m.jnt_type[j] == 2:
-            refuse(f"slide joint '{m.joint(j).name}'", "use free, ball and hinge joints")
-        if m.jnt_type[j] == 0 and m.body_parentid[m.jnt_bodyid[j]] != 0:
-            refuse(f"free joint '{m.joint(j).name}' inside a tree", "put it on a top-level body")
-    for g in range(m.ngeom):
-        collides = m.geom_contype[g] or m.geom_conaffinity[g]
-        kind = int(m.geom_type[g])
-        if kind not in GEOMS and collides:
-            refuse(
-                f"{_geom_type(kind)} geom '{m.geom(g).name or g}' that collides",
-                "use capsules, boxes, spheres and planes, or set contype and conaffinity to 0",
-            )
-        if collides and m.geom_condim[g] > 3:
-            refuse(f"condim {m.geom_condim[g]} of geom '{m.geom(g).name or g}'", "use condim 1 or 3")
-        if kind == 0 and m.body_weldid[m.geom_bodyid[g]] != 0:
-            refuse(f"plane '{m.geom(g).name or g}' on a moving body", "planes belong to the world")
-    for count, what in (
-        (m.neq, "an equality constraint"),
-        (m.ntendon, "a tendon"),
-        (m.npair, "an explicit contact pair"),
-        (m.nmocap, "a mocap body"),
-        (m.nflex, "a flex"),
-        (m.nplugin, "a plugin"),
-    ):
-        if count:
-            refuse(what, "remove it from the file")
-    if np.any(m.dof_frictionloss > 0):
-        dof = int(np.argmax(m.dof_frictionloss > 0))
-        refuse(f"frictionloss of joint '{m.joint(m.dof_jntid[dof]).name}'", "use damping")
-    if m.opt.density or m.opt.viscosity:
-        refuse("a fluid medium (option density, viscosity)", "remove it")
-    if np.any(m.body_gravcomp):
-        body = int(np.argmax(m.body_gravcomp != 0))
-        refuse(f"gravcomp of body '{m.body(body).name}'", "remove it")
-    import mujoco
-
-    for flag in mujoco.mjtDisableBit.__members__.values():
-        if m.opt.disableflags & int(flag) and flag in _needed_flags():
-            name = flag.name.removeprefix("mjDSBL_").lower()
-            refuse(f"option flag {name}='disable'", f"leave {name} enabled")
-
-
-def _needed_flags() -> set[mujoco.mjtDisableBit]:
-    """Parts of a step that a file may not switch off."""
-    import mujoco
-
-    names = ("CONSTRAINT", "LIMIT", "CONTACT", "SPRING", "DAMPER", "GRAVITY", "ACTUATION")
-    return {getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}") for name in names}
-
-
-def _geom_type(kind: int) -> str:
-    import mujoco
-
-    return mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
-
-
 def read_shapes(m: mujoco.MjModel) -> list[Shape]:
     """The geoms that collide, and those that only show, of a supported kind."""
     shapes = []
@@ -248,7 +202,7 @@ def read_shapes(m: mujoco.MjModel) -> list[Shape]:
         kind = GEOMS.get(int(m.geom_type[g]))
         if kind is None:
             continue
-        user = m.geom_user[g] if m.nuser_geom >= 3 else (0.0, 0.2, 1.0e-5)
+        user = m.geom_user[g]
         sizes = {"sphere": 1, "capsule": 2, "box": 3, "plane": 0}[kind]
         shapes.append(
             Shape(
@@ -287,7 +241,9 @@ def read_links(m: mujoco.MjModel) -> tuple[Tables, dict[str, np.ndarray]]:
         for j in range(first, first + int(m.body_jntnum[b])):
             joint = JOINTS[int(m.jnt_type[j])]
             anchor = np.zeros(3) if joint == FREE else m.jnt_pos[j]
-            low, high = m.jnt_range[j]
+            # a limit pushes from its margin on, as MuJoCo's; a ball joint's lower end is no limit
+            margin = m.jnt_margin[j]
+            low, high = m.jnt_range[j] + [0.0 if joint == BALL else margin, -margin]
             q = int(m.jnt_qposadr[j])
             t.link_parent.append(link)
             t.link_joint.append(joint)
@@ -304,9 +260,7 @@ def read_links(m: mujoco.MjModel) -> tuple[Tables, dict[str, np.ndarray]]:
             t.link_upper.append(float(high))
             t.link_near.append(float(np.cos(0.5 * max(high - 0.3, 0.0))))
             stiffness = np.atleast_1d(m.jnt_stiffness[j])[0]
-            t.link_sprung.append(int(stiffness > 0 and joint != FREE))
-            if stiffness > 0 and joint == FREE:
-                raise ModelError(f"stiffness of free joint '{m.joint(j).name}' is not supported")
+            t.link_sprung.append(int(stiffness > 0))
             link = len(t.link_parent) - 1
             offset, turn = -anchor, np.array([0, 0, 0, 1.0])
         body_link[b], body_offset[b], body_turn[b] = link, offset, turn
@@ -342,59 +296,3 @@ def read_inertia(
         "link_moments": second[:, [0, 1, 2], [0, 1, 2]],
         "link_products": second[:, [0, 0, 1], [1, 2, 2]],
     }
-
-
-def _both_ways(low: float, high: float, what: str) -> float:
-    """The effort limit of a range. Raises ModelError where it is not the same both ways."""
-    if not np.isclose(-low, high):
-        raise ModelError(f"{what}: a force range must be the same both ways, not {low:g} to {high:g}")
-    return float(high)
-
-
-def read_drives(m: mujoco.MjModel, t: Tables, path: str | Path) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """kp, kd per dof [N m/rad, N m s/rad] from position actuators; efforts go into `t`; and notes on
-    actuators that are left to the user."""
-    kp, kd = np.zeros(m.nv), np.zeros(m.nv)
-    effort = np.full(m.nv, ANYWHERE)
-    notes = []
-    for j in range(m.njnt):
-        if m.jnt_actfrclimited[j]:
-            low, high = m.jnt_actfrcrange[j]
-            limit = _both_ways(low, high, f"{path}: joint '{m.joint(j).name}'")
-            effort[m.jnt_dofadr[j]] = limit
-    for a in range(m.nu):
-        name = m.actuator(a).name or str(a)
-        if int(m.actuator_trntype[a]) not in (0, 1) or int(m.actuator_dyntype[a]) != 0:
-            raise ModelError(f"{path}: actuator '{name}' is not supported; use position actuators")
-        if int(m.actuator_biastype[a]) == 0:
-            notes.append(f"motor '{name}' has no drive: use Simulation.set_joint_force")
-            continue
-        gain, bias = m.actuator_gainprm[a], m.actuator_biasprm[a]
-        if int(m.actuator_biastype[a]) != 1 or not np.isclose(gain[0], -bias[1]) or gain[0] <= 0:
-            raise ModelError(f"{path}: actuator '{name}' is not a position servo (kp, kv)")
-        j = int(m.actuator_trnid[a, 0])
-        gear = m.actuator_gear[a, :3]
-        axis = int(np.argmax(np.abs(gear))) if m.jnt_type[j] == 1 else 0
-        unit = np.eye(3)[axis]
-        if m.jnt_type[j] == 0 or not np.allclose(gear, unit):
-            raise ModelError(f"{path}: actuator '{name}': gear must be one unit axis of a joint")
-        dof = int(m.jnt_dofadr[j]) + axis
-        if kp[dof] > 0:
-            raise ModelError(f"{path}: actuator '{name}' is a second drive of the same joint")
-        if m.actuator_ctrllimited[a]:
-            raise ModelError(f"{path}: actuator '{name}': ctrlrange is not supported; limit the joint")
-        kp[dof], kd[dof] = gain[0], -bias[2]
-        if m.actuator_forcelimited[a]:
-            low, high = m.actuator_forcerange[a]
-            effort[dof] = min(effort[dof], _both_ways(low, high, f"{path}: actuator '{name}'"))
-    for i in range(1, len(t.link_joint)):
-        dof = t.link_dof[i]
-        if t.link_joint[i] == BALL:
-            same = all(np.ptp(v[dof : dof + 3]) < 1e-9 for v in (kp, kd))
-            if not same:
-                raise ModelError(f"{path}: a ball joint's three drives must have the same kp and kv")
-            t.link_effort[i] = float(effort[dof : dof + 3].min())
-        elif t.link_joint[i] == HINGE:
-            t.link_effort[i] = float(effort[dof])
-        t.link_driven[i] = int(kp[dof] > 0 and t.link_effort[i] < ANYWHERE)
-    return kp, kd, notes

@@ -58,7 +58,7 @@ class Simulate(ClipInput, Outputs):
         one = stage_skill(model, self._skill())
         reference = one.reference
         say(f"{'clip' if one.skill.is_clip else 'skill':9} {_title(one)}, {reference.duration:.2f} s")
-        for note in one.notes:
+        for note in (*model.notes, *one.notes):
             say(f"          {note}")
         _check_length(reference, self.repeat)
         if self.repeat > 1:

@@ -47,28 +47,46 @@ REFUSED = {
     "ellipsoid": (geom('type="ellipsoid" size="0.1 0.1 0.2"'), "ellipsoid geom 'g'"),
     "condim 4": (geom('size="0.1" condim="4"'), "condim 4 of geom 'g'"),
     "condim 6": (geom('size="0.1" condim="6"'), "condim 6 of geom 'g'"),
-    "frictionloss": (joint('frictionloss="0.1"'), "frictionloss of joint 'j'"),
+    "frictionloss": (joint('frictionloss="0.1"'), "frictionloss 0.1 of joint 'j'"),
     "free joint stiffness": (joint('type="free" stiffness="3"'), "stiffness of free joint 'j'"),
     "moving plane": (
         mjcf('<body><joint/><geom size="0.1"/><geom name="p" type="plane" size="1 1 1"/></body>'),
         "plane",  # MuJoCo's compiler already says so
     ),
     "equality": (mjcf(TWO, rest='<equality><joint joint1="ja" joint2="jb"/></equality>'), "equality"),
+    "limit that gives way": (
+        joint('range="0 1" limited="true" solreflimit="0.5 1"'),
+        "solreflimit 0.5 1 of joint 'j'",
+    ),
+    "soft contact": (geom('size="0.1" solref="0.2 1"'), "solref 0.2 1 of geom 'g'"),
+    "parent filter": (
+        mjcf().replace("<option />", '<option><flag filterparent="disable"/></option>'),
+        "option flag filterparent='disable'",
+    ),
     "tendon": (
-        mjcf(TWO, rest='<tendon><fixed><joint joint="ja" coef="1"/></fixed></tendon>'),
-        "tendon",
+        mjcf(TWO, rest='<tendon><fixed stiffness="3"><joint joint="ja" coef="1"/></fixed></tendon>'),
+        "stiffness 3 of tendon '0'",
     ),
     "contact pair": (mjcf(TWO, rest='<contact><pair geom1="ga" geom2="gb"/></contact>'), "contact pair"),
     "mocap": (mjcf(BODY + '<body mocap="true"><geom size="0.1"/></body>'), "mocap"),
-    "fluid": (mjcf(option='density="1.2"'), "fluid"),
-    "viscosity": (mjcf(option='viscosity="0.1"'), "fluid"),
+    "fluid": (mjcf(option='density="1.2"'), "option density"),
+    "viscosity": (mjcf(option='viscosity="0.1"'), "option viscosity"),
     "velocity servo": (actuator('<velocity name="a" joint="j" kv="1"/>'), "actuator 'a'"),
     "muscle": (actuator('<muscle name="a" joint="j" lengthrange="0.1 1"/>'), "actuator 'a'"),
     "integrated velocity": (
         actuator('<intvelocity name="a" joint="j" kp="1" actrange="-1 1"/>'),
         "actuator 'a'",
     ),
-    "gear 2": (actuator('<position name="a" joint="j" kp="1" gear="2"/>'), "actuator 'a': gear"),
+    "gear 0": (actuator('<position name="a" joint="j" kp="1" gear="0"/>'), "actuator 'a': gear"),
+    "constant torque": (
+        actuator('<general name="a" joint="j" biastype="affine" gainprm="1" biasprm="5 -1 0"/>'),
+        "actuator 'a' is not a position servo",
+    ),
+    "gain that follows the joint": (
+        actuator('<general name="a" joint="j" gaintype="affine" gainprm="1 1 0"/>'),
+        "actuator 'a'",
+    ),
+    "pid": (actuator('<pid name="a" joint="j" kp="1" ki="1"/>'), "actuator 'a'"),
     "gear askew": (
         actuator('<position name="a" joint="j" kp="1" gear="1 1 0"/>', "ball"),
         "actuator 'a': gear",
