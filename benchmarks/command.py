@@ -80,6 +80,8 @@ class Result:
     contacts: float = 0.0
     velocity_error: float = 0.0
     """[rad/s], see `ours.solver_error`"""
+    against: str = ""
+    """the peer and its version, as "MuJoCo 4.0.1\""""
     peers: dict[str, dict[str, float | None]] = field(default_factory=dict)
     """setting -> steps_per_second, contacts, velocity_error, ratio"""
 
@@ -109,7 +111,7 @@ def step(options: Step) -> Result:
     if options.against == "mujoco":
         peers = {name: MuJoCo(scene, name) for name in SETTINGS}
     elif options.against == "mujoco_warp":
-        peers = {f"Warp, {n} worlds": MuJoCoWarp(scene, n, options.device) for n in options.worlds}
+        peers = {f"{n} worlds": MuJoCoWarp(scene, n, options.device) for n in options.worlds}
     times: dict[Side, list[float]] = {side: [] for side in (*sides, *peers.values())}
     for round_ in range(options.rounds):
         for side, seconds in times.items():
@@ -127,6 +129,7 @@ def step(options: Step) -> Result:
     result.parts_us = sides[-1].parts()
     result.velocity_error = solver_error(scene, SWEEPS)
     best = max(row["steps_per_second"] for row in result.rows)
+    result.against = next((peer.version for peer in peers.values()), "")
     for name, peer in peers.items():
         speed = 1 / float(np.median(times[peer]))
         contacts = float(np.mean(peer.contacts))
@@ -181,7 +184,7 @@ def print_step(result: Result) -> None:
         error = peer["velocity_error"]
         off = "" if error is None else f"velocity error {error:.1e} rad/s, "
         print(
-            f"MuJoCo {name}: {peer['steps_per_second']:,} steps/s, {peer['contacts']:.1f} contacts, "
+            f"{result.against}, {name}: {peer['steps_per_second']:,} steps/s, {peer['contacts']:.1f} contacts, "
             f"{off}ours is {peer['ratio']} x"
         )
 

@@ -6,6 +6,7 @@ It steps through a captured graph on CUDA; on a CPU, where it is meant for devel
 from __future__ import annotations
 
 import time
+from importlib.metadata import version
 
 import numpy as np
 import warp as wp
@@ -24,6 +25,7 @@ class MuJoCoWarp:
         import mujoco_warp as mjw
 
         self.mjw, self.scene, self.worlds = mjw, scene, worlds
+        self.version = f"MuJoCo Warp {version('mujoco-warp')} (MuJoCo {mujoco.__version__})"
         self.device = wp.get_device(device)
         model = mujoco.MjModel.from_xml_path(str(scene.model.path))
         data = mujoco.MjData(model)

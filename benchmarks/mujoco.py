@@ -24,6 +24,7 @@ class MuJoCo:
         import mujoco
 
         self.mujoco = mujoco
+        self.version = f"MuJoCo {mujoco.__version__}"
         self.scene = scene
         self.model = mujoco.MjModel.from_xml_path(str(scene.model.path))
         solver, iterations = SETTINGS[setting]

@@ -81,11 +81,13 @@ def _mujoco(scene: Scene, count: int) -> Callable[[], object]:
 
 
 def print_reset(options: Reset, found: dict[str, float]) -> None:
+    import mujoco
+
     print(f"{options.reset} of {options.worlds} worlds reset: {found['launches']:.0f} launch(es)")
     for name, label in (
         ("place_us", "placed from a pool of states"),
         ("reset_us", "reset from joint coordinates"),
-        ("mujoco_us", f"MuJoCo, mj_resetData {options.reset} times"),
+        ("mujoco_us", f"MuJoCo {mujoco.__version__}, mj_resetData {options.reset} times"),
         ("fragment_us", f"{FRAGMENT} steps of all worlds"),
     ):
-        print(f"{label:>32} {found[name]:10.1f} us")
+        print(f"{label:>38} {found[name]:10.1f} us")
