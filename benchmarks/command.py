@@ -184,8 +184,8 @@ def print_step(result: Result) -> None:
         error = peer["velocity_error"]
         off = "" if error is None else f"velocity error {error:.1e} rad/s, "
         print(
-            f"{result.against}, {name}: {peer['steps_per_second']:,} steps/s, {peer['contacts']:.1f} contacts, "
-            f"{off}ours is {peer['ratio']} x"
+            f"{result.against}, {name}: {peer['steps_per_second']:,} steps/s, "
+            f"{peer['contacts']:.1f} contacts, {off}ours is {peer['ratio']} x"
         )
 
 
