@@ -26,9 +26,9 @@ FLOORS = (
 """From the bottom: nothing imports from a line above its own. Whatever is new takes its place here."""
 
 NOT_THEIRS = {
-    "kernels": "numpy scipy mujoco torch tyro rich pxr pybvh pooch trimesh matplotlib tensorboard",
-    "sims": "tyro rich pxr pybvh pooch trimesh matplotlib tensorboard",
-    "learning": "tyro rich pxr pybvh pooch trimesh matplotlib",
+    "kernels": "numpy scipy mujoco torch tyro rich pxr pooch trimesh matplotlib tensorboard",
+    "sims": "tyro rich pxr pooch trimesh matplotlib tensorboard",
+    "learning": "tyro rich pxr pooch trimesh matplotlib",
 }
 """Other packages that have no business there: file formats, pictures, the command line."""
 

@@ -14,10 +14,12 @@ from scipy.spatial.transform import Rotation
 from ..sims.recording.motion import Motion
 from .asf import SHIFTS, TURNS, Bone, Skeleton, read_asf, read_text
 from .errors import ClipError
+from .rate import given_rate, header_rate
 from .space import CMU_UNIT, check_numbers, into_room
 
 RATE = 120.0
-"""[Hz] The format does not say it; CMU's recordings of people have this."""
+"""[Hz] where no header says it, as none of CMU's does; most of their recordings of people have this."""
+RATE_WORDS = (":samples-per-second", ":sample-rate", ":frames-per-second", ":frame-rate", ":fps")
 BVH_NAMES = {
     "root": "Hips", "lowerback": "LowerBack", "upperback": "Spine", "thorax": "Spine1",
     "lowerneck": "Neck", "upperneck": "Neck1", "head": "Head",
@@ -35,20 +37,25 @@ for _short, _side in (("l", "Left"), ("r", "Right")):
 
 
 def read_amc(
-    path: str | Path, units: str | float | None = None, up: str | None = None, asf: str | Path | None = None
+    path: str | Path,
+    units: str | float | None = None,
+    up: str | None = None,
+    asf: str | Path | None = None,
+    rate: float | None = None,
 ) -> tuple[Motion, list[str]]:
     """Read an AMC file as a Motion in metres, Z up, and notes.
 
     asf: the skeleton; without it the one ASF file of the same name, of the part before `_`, or alone in
-    the folder. units, up: as in `clips.read_clip`. Raises ClipError.
+    the folder. units, up, rate: as in `clips.read_clip`. Raises ClipError.
     """
     path = Path(path)
     lines = read_text(path, "AMC")
     asf = Path(asf) if asf is not None else _skeleton_beside(path)
     skeleton = read_asf(asf)
     numbers, degrees = _frames(path, lines, skeleton)
-    motion = _motion(path, skeleton, numbers, degrees)
-    notes = [f"skeleton {asf.name}; rate taken as {RATE:g} Hz, the format does not say it"]
+    rate, said = given_rate(rate) if rate is not None else _rate(path, lines)
+    motion = _motion(path, skeleton, numbers, degrees, rate)
+    notes = [f"skeleton {asf.name}; {said}"]
     special = None
     if set(skeleton.bones) == set(BVH_NAMES):
         notes.append("CMU skeleton: joints named as in its BVH conversion")
@@ -71,6 +78,14 @@ def _skeleton_beside(path: Path) -> Path:
         return beside[0]
     has = "there is none" if not beside else f"there are {', '.join(p.name for p in beside[:3])}"
     raise ClipError(path, f"needs its skeleton, {path.stem.partition('_')[0]}.asf, beside it; {has}")
+
+
+def _rate(path: Path, lines: list[list[str]]) -> tuple[float, str]:
+    """[Hz] of the header, and a note."""
+    for line in lines:
+        if line[0].lower() in RATE_WORDS:
+            return header_rate(path, " ".join(line[1:]))
+    return RATE, f"rate taken as {RATE:g} Hz, the file does not say it"
 
 
 def _frames(path: Path, lines: list[list[str]], skeleton: Skeleton) -> tuple[dict[str, np.ndarray], bool]:
@@ -109,7 +124,9 @@ def _check_complete(path: Path, rows: dict[str, list[list[float]]], frame: int) 
         raise ClipError(path, f"broken AMC: frame {frame} lacks {', '.join(short[:3])}")
 
 
-def _motion(path: Path, skeleton: Skeleton, numbers: dict[str, np.ndarray], degrees: bool) -> Motion:
+def _motion(
+    path: Path, skeleton: Skeleton, numbers: dict[str, np.ndarray], degrees: bool, rate: float
+) -> Motion:
     """The motion in the file's units and axes: a joint where each bone begins, an end where a chain ends."""
     bones = list(skeleton.bones.values())
     numbering = {bone.name: i for i, bone in enumerate(bones)}
@@ -137,7 +154,7 @@ def _motion(path: Path, skeleton: Skeleton, numbers: dict[str, np.ndarray], degr
         offsets=np.array(offsets),
         rotations=rotations,
         root_position=position,
-        rate=RATE,
+        rate=rate,
         rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (len(names), 1)),
     )
 

@@ -50,7 +50,7 @@ def into_room(
     unit, its name) that is tried first when none are given. Raises ClipError for what cannot be told.
     """
     scale, said = _unit(path, motion, units, special)
-    axis, told = _up(path, motion, up)
+    axis, told = _up(path, replace(motion, positions=None), up)
     turn = TO_Z_UP[axis]
     yaw = _facing(motion, turn)
     turn = Rotation.from_euler("z", 90.0 * yaw, degrees=True).as_matrix().round() @ turn
@@ -60,6 +60,7 @@ def into_room(
         rotations=change_basis(motion.rotations, turn),
         root_position=scale * motion.root_position @ turn.T,
         rest_rotations=change_basis(motion.rest_rotations, turn),
+        positions=None if motion.positions is None else scale * motion.positions @ turn.T,
     )
     return moved, [note for note in (said, told) if note]
 

@@ -10,13 +10,11 @@ from tyro.conf import Positional
 
 
 @dataclass
-class ClipInput:
+class ClipFile:
     """A recorded clip and how to read it."""
 
     clip: Positional[Path]
     """Recorded clip: a .bvh, .amc (with its .asf) or BallPlay-M .pt file."""
-    frames: tuple[int, int] = (0, -1)
-    """First and last frame of the part to use, counted from 0; -1 is the clip's last."""
     units: str | None = None
     """Length unit of the file: m, cm, mm, inch, foot, cmu or metres per unit. Told from the skeleton if not
     given."""
@@ -24,16 +22,33 @@ class ClipInput:
     """Axis of the file that points up. Told from the skeleton if not given."""
     asf: Path | None = None
     """Skeleton of an .amc clip, where it is not beside it."""
+    rate: float | None = None
+    """Frames a second, where the file says none or a wrong one."""
+    drop_positions: bool = False
+    """Leave positions that a .bvh file has at joints other than the root, and take the bones as its offsets
+    have them."""
+
+    def reading(self) -> dict[str, Any]:
+        """Arguments for `clips.read_clip`."""
+        return {
+            "path": self.clip,
+            "units": self.units,
+            "up": self.up,
+            "asf": self.asf,
+            "rate": self.rate,
+            "drop_positions": self.drop_positions,
+        }
+
+
+@dataclass
+class ClipInput(ClipFile):
+    """A part of a recorded clip."""
+
+    frames: tuple[int, int] = (0, -1)
+    """First and last frame of the part to use, counted from 0; -1 is the clip's last."""
     repair: str = ""
     """Repairs, joined by commas: spikes, toes, lowpass, ground; or all."""
 
     def reading(self) -> dict[str, Any]:
         """Arguments for `clips.read_part`."""
-        return {
-            "path": self.clip,
-            "frames": self.frames,
-            "repairs": self.repair,
-            "units": self.units,
-            "up": self.up,
-            "asf": self.asf,
-        }
+        return super().reading() | {"frames": self.frames, "repairs": self.repair}

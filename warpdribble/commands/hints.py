@@ -19,6 +19,7 @@ HINTS = {
     "files": "with the files at hand give --mirror FOLDER",
     "units": "say which with --units",
     "up": "say which with --up",
+    "rate": "say which with --rate",
     "repairs": "give others with --repair",
     "mapping": "give another --mapping",
     "seed": "try another --seed",

@@ -89,6 +89,8 @@ class Simulate(ClipInput, Outputs):
             units=reading["units"],
             up=reading["up"],
             asf=None if self.asf is None else str(self.asf),
+            rate=reading["rate"],
+            drop_positions=reading["drop_positions"],
             mapping=self.mapping,
             cyclic=self.repeat > 1,
             ball=self.ball,

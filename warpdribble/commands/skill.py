@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .clip_input import ClipFile
 from .console import say
 
 
@@ -64,11 +65,9 @@ class Show:
 
 
 @dataclass
-class Draft:
+class Draft(ClipFile):
     """Write a first version of a skill from a clip: its best cycle, contacts, checkpoints, heights."""
 
-    clip: Positional[Path]
-    """Recorded clip."""
     out: Path = Path("skill.toml")
     """The file to write."""
     frames: tuple[int, int] | None = None
@@ -85,7 +84,10 @@ class Draft:
         from ..skills.draft import draft, write_draft
         from ..skills.skill import parse_skill
 
-        text = draft(Model.load("player"), self.clip, self.frames, self.name, self.mapping, self.whole)
+        reading = self.reading()
+        clip = reading.pop("path")
+        model = Model.load("player")
+        text = draft(model, clip, self.frames, self.name, self.mapping, self.whole, **reading)
         parse_skill(text, str(self.out))
         write_draft(self.out, text)
         say(text.rstrip())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 from ..clips.data import data_folder
 from ..clips.read import read_clip
@@ -25,10 +26,12 @@ def draft(
     name: str = "",
     mapping: str = "",
     whole: bool = False,
+    **reading: Any,
 ) -> str:
     """The text of a skill's file. frames: None takes the best cycle of the clip, or all of it (always when
-    `whole`). Raises ClipError and MappingError (ValueErrors)."""
-    motion, _ = read_clip(clip)
+    `whole`). reading: how the clip is read, as `clips.read_clip` takes it. Raises ClipError and
+    MappingError (ValueErrors)."""
+    motion, _ = read_clip(clip, **reading)
     wanted = read_mapping(mapping) if mapping else find_mapping(motion)
     cyclic, others = False, []
     if frames is None:
@@ -50,6 +53,7 @@ def draft(
     ]
     if mapping:
         lines.append(f'mapping = "{_quoted(mapping)}"')
+    lines += _as_read(reading)
     for c in others:
         lines.append(f"# also a cycle: frames = [{c.first}, {c.last}], ends {100 * c.pose_gap:.1f} cm apart")
     if ball is None:
@@ -72,6 +76,18 @@ def write_draft(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def _as_read(reading: dict[str, Any]) -> list[str]:
+    """The keys of a skill that say how its clip is read, where that was said."""
+    lines = [f'{key} = "{_quoted(str(reading[key]))}"' for key in ("units", "up") if reading.get(key)]
+    if reading.get("asf"):
+        lines.append(f'asf = "{_quoted(_relative(Path(reading["asf"])))}"')
+    if reading.get("rate"):
+        lines.append(f"rate = {float(reading['rate'])}")
+    if reading.get("drop_positions"):
+        lines.append("drop_positions = true")
+    return lines
 
 
 def _relative(clip: Path) -> str:

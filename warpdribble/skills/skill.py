@@ -54,7 +54,11 @@ class Skill:
     up: str = ""
     """which of its axes points up, and"""
     asf: str = ""
-    """the skeleton of an .amc clip: as `clips.read_clip` takes them, or empty."""
+    """the skeleton of an .amc clip, and"""
+    rate: float = 0.0
+    """[Hz] in place of the file's: as `clips.read_clip` takes them, or empty, or 0."""
+    drop_positions: bool = False
+    """Of .bvh joints other than the root."""
     contact: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """"left" and "right" -> (from, to) [s] in which that hand has the ball; empty: inferred."""
     checkpoints: tuple[float, ...] = ()
@@ -69,9 +73,9 @@ class Skill:
 
 
 def clip_skill(clip: str | Path, frames: tuple[int, int] = (0, -1), **rest: Any) -> Skill:
-    """A part of a clip as a skill that has no file yet. rest: fields of `Skill`; None stands for empty."""
+    """A part of a clip as a skill that has no file yet. rest: fields of `Skill`; None: its default."""
     path = str(clip)
-    rest = {key: "" if value is None else value for key, value in rest.items()}
+    rest = {key: value for key, value in rest.items() if value is not None}
     first, last = frames
     part = f"frames {first} to {'the last' if last < 0 else last}"
     return Skill(Path(clip).stem, path, f"{Path(clip).name}, {part}", path, frames=frames, **rest)
@@ -124,9 +128,11 @@ def parse_skill(text: str, source: str) -> Skill:
             reason = f"{first} to {last} is no range: two rising numbers from 0, or -1 for the last"
             _expect(first >= 0 and (last == -1 or first < last), source, key, reason)
             out[key] = tuple(value)
-        elif key in ("ball", "cyclic", "mirror"):
+        elif key in ("ball", "cyclic", "mirror", "drop_positions"):
             _expect(isinstance(value, bool), source, key, "should be true or false")
             out[key] = value
+        elif key == "rate":
+            out[key] = _number(source, key, value)
         elif key == "contact":
             out |= _contact(source, value)
         else:

@@ -44,7 +44,7 @@ class StagedSkill:
     notes: tuple[str, ...] = ()
 
 
-READING = ("frames", "units", "up", "repairs")
+READING = ("frames", "units", "up", "repairs", "rate")
 """Keys that say how a clip is read, and hints of what is wrong with them."""
 
 
@@ -134,8 +134,16 @@ def _recorded(
         return SkillError(skill.source, key, reason)
 
     try:
-        reading = skill.units or None, skill.up or None, asf
-        motion, notes = read_part(path, skill.frames, skill.repairs, *reading)
+        motion, notes = read_part(
+            path,
+            skill.frames,
+            skill.repairs,
+            units=skill.units or None,
+            up=skill.up or None,
+            asf=asf,
+            rate=skill.rate or None,
+            drop_positions=skill.drop_positions,
+        )
     except InputError as error:
         key = error.hint if error.hint in READING else "clip"
         raise fail(key, f"{path.name}: {error.reason}", error) from None

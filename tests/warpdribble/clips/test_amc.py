@@ -71,6 +71,27 @@ def test_lengths_are_scaled_by_what_is_given_or_by_the_header(amc_clip):
         places(amc_clip, units=None)
 
 
+@pytest.mark.parametrize("line", [":SAMPLES-PER-SECOND 60", ":samples-per-second 60.0", ":Frame-Rate 60"])
+def test_the_rate_is_the_header_s_or_a_given_one(amc_clip, line):
+    bare = amc_clip.read_text()
+    _, motion, notes = places(amc_clip)
+    assert motion.rate == 120.0 and "rate taken as 120 Hz, the file does not say it" in notes[0]
+    amc_clip.write_text(bare.replace(":DEGREES", f":DEGREES\n{line}"))
+    _, motion, notes = places(amc_clip)
+    assert motion.rate == 60.0 and "rate 60 Hz, as its header says" in notes[0]
+    _, motion, notes = places(amc_clip, rate=30.0)
+    assert motion.rate == 30.0 and "rate given: 30 Hz" in notes[0]
+
+
+@pytest.mark.parametrize("word", ["", "0", "-60", "many", "nan", "60 60"])
+def test_a_header_s_rate_that_is_none_has_to_be_given(amc_clip, word):
+    amc_clip.write_text(amc_clip.read_text().replace(":DEGREES", f":DEGREES\n:SAMPLES-PER-SECOND {word}"))
+    with pytest.raises(ClipError, match="frames a second") as refused:
+        places(amc_clip)
+    assert refused.value.hint == "rate"
+    assert places(amc_clip, rate=60.0)[1].rate == 60.0
+
+
 def cmu_skeleton():
     """ASF text with CMU's bones, a standing person, Y up."""
     spine = ["lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head"]

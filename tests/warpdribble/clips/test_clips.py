@@ -77,6 +77,14 @@ def test_ballplay_has_its_own_units(ballplay_clip):
         read_clip(ballplay_clip, units="cm")
 
 
+def test_any_clip_s_rate_can_be_given(cmu_clip, amc_clip, ballplay_clip):
+    for path, reading in ((cmu_clip, {}), (amc_clip, {"units": "m", "up": "z"}), (ballplay_clip, {})):
+        as_it_is, _ = read_clip(path, **reading)
+        motion, notes = read_clip(path, rate=50, **reading)
+        assert motion.rate == 50.0 != as_it_is.rate and any("rate given: 50 Hz" in note for note in notes)
+        assert np.array_equal(motion.root_position, as_it_is.root_position)
+
+
 @pytest.mark.parametrize("name", ["clip.fbx", "clip", "clip.asf"])
 def test_other_files_are_refused(tmp_path, name):
     (tmp_path / name).write_text("x")

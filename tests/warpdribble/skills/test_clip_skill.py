@@ -21,6 +21,8 @@ REST = {
         "units": "cmu",
         "up": "y",
         "asf": "/else/where.asf",
+        "rate": 59.94,
+        "drop_positions": True,
         "mapping": "cmu",
         "cyclic": True,
         "mirror": True,
@@ -51,7 +53,7 @@ def test_its_file_says_where_it_lies(tmp_path, monkeypatch):
 
 
 def test_none_stands_for_empty():
-    assert clip_skill("a.bvh", units=None, up=None, asf=None) == clip_skill("a.bvh")
+    assert clip_skill("a.bvh", units=None, up=None, asf=None, rate=None) == clip_skill("a.bvh")
 
 
 def test_the_text_of_a_skill_is_its_file(tmp_path):

@@ -109,6 +109,13 @@ def test_a_draft_is_a_skill_that_plays(player, mocap, tmp_path, monkeypatch):
     assert stage_skill(player, one).ball.touch.any()
 
 
+def test_a_draft_reads_its_clip_as_it_was_told_to(player, cmu_clip):
+    text = draft(player, cmu_clip, whole=True, units="cmu", up="y", rate=100.0, drop_positions=True)
+    one = parse_skill(text, "mine.toml")
+    assert (one.units, one.up, one.rate, one.drop_positions) == ("cmu", "y", 100.0, True)
+    assert stage_skill(player, one).reference.duration == pytest.approx(1.2, abs=0.011)
+
+
 def test_names_are_told_from_clips(tmp_path):
     assert is_skill("waist") and is_skill("my.toml") and is_skill("nonsense")
     assert not is_skill("clip.bvh") and not is_skill(tmp_path)
