@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..trees import below
+from .names import bare
 
 PARTS = {
     "hip": ("upleg", "upperleg", "thigh", "femur", "hip"),
@@ -31,7 +32,7 @@ def parts(names: Sequence[str], parents: np.ndarray) -> dict[str, int]:
     "left_shoulder", "left_elbow", "left_wrist", and the tips of the toes and of the longest fingers,
     "left_toe_tip", "left_hand". A part that no name tells is not in it."""
     found: dict[str, int] = {}
-    plain = [_plain(name) for name in names]
+    plain = [_plain(name) for name in bare(names)]
     for side in SIDES:
         for part, words in PARTS.items():
             joint = next((plain.index((side, w)) for w in words if (side, w) in plain), None)
@@ -58,8 +59,7 @@ def leftward(found: dict[str, int], places: np.ndarray) -> np.ndarray | None:
 
 
 def _plain(name: str) -> tuple[str, str]:
-    """(side, word) of a joint's name: 'mixamorig:LeftUpLeg' and 'l_upleg' are ('left', 'upleg')."""
-    name = name.rpartition(":")[2]
+    """(side, word) of a joint's bare name: 'LeftUpLeg' and 'l_upleg' are ('left', 'upleg')."""
     short = re.match(r"^([lLrR])[_.\- ]|.*[_.\- ]([lLrR])$", name)
     word = re.sub(r"[^a-z0-9]", "", name.lower())
     for side in SIDES:

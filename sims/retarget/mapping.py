@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from ...assets import path as asset
 from ..model import Model
 from ..recording.motion import Motion
+from ..recording.names import bare
 
 SHIPPED = ("cmu", "ballplay", "mixamo", "lafan")
 
@@ -36,8 +38,6 @@ class Mapping:
     """Hand -> wrist, index, middle and little knuckle, whose places are trusted more than rotations."""
     smoothed: dict[str, float] = field(default_factory=dict)
     """Body -> cut-off [Hz] of a low-pass filter, for joints the recording shows with noise."""
-    prefix: str = ""
-    """What may stand before every joint's name in the recording."""
     rest: Literal["recorded", "directions"] = "recorded"
     """The T-pose: as the motion has it, or built from the directions of its bones."""
     description: str = ""
@@ -56,22 +56,29 @@ class Mapping:
         return named
 
     def plain(self, motion: Motion) -> Motion:
-        """The motion with the names of this mapping (prefix taken off). Raises MappingError for a joint
-        that is not in it."""
-        from dataclasses import replace
+        """The motion with the names of this mapping. Raises MappingError for joints that are not in it."""
+        if missing := self.missing(motion):
+            key, others = self.joints()[missing[0]], f", nor {_some(missing[1:])}" if missing[1:] else ""
+            raise MappingError(
+                f"{self.name}: {key}: no joint '{missing[0]}' in this motion{others}; "
+                f"it has {', '.join(motion.joint_names)}"
+            )
+        return replace(motion, joint_names=self._named(motion))
 
-        names = tuple(n.removeprefix(self.prefix) for n in motion.joint_names)
-        for joint, key in self.joints().items():
-            if joint not in names:
-                raise MappingError(
-                    f"{self.name}: {key}: no joint '{joint}' in this motion; it has {', '.join(names)}"
-                )
-        return replace(motion, joint_names=names)
+    def missing(self, motion: Motion) -> list[str]:
+        """Joints that are named here and are not in the motion, whatever namespace it has."""
+        names = self._named(motion)
+        return [joint for joint in self.joints() if joint not in names]
 
-    def fits(self, motion: Motion) -> bool:
-        """Whether the motion has every joint that is named here."""
-        names = {n.removeprefix(self.prefix) for n in motion.joint_names}
-        return names >= set(self.joints())
+    def _named(self, motion: Motion) -> tuple[str, ...]:
+        """The motion's names, those that are ours but for a namespace as they are named here."""
+        own = tuple(self.joints())
+        if set(own) <= set(motion.joint_names):
+            return motion.joint_names
+        ours = dict(zip(bare(own), own))
+        return tuple(
+            ours.get(short, name) for short, name in zip(bare(motion.joint_names), motion.joint_names)
+        )
 
     def check_model(self, model: Model) -> None:
         """Raise MappingError for a body or hinge that the model does not have, or a hand without knuckles."""
@@ -128,7 +135,7 @@ def parse_mapping(text: str, name: str) -> Mapping:
         if not data.get(key):
             raise MappingError(f"{name}: {key}: missing")
     for key, value in data.items():
-        if key in ("prefix", "description", "rest"):
+        if key in ("description", "rest"):
             _expect(isinstance(value, str), name, key, "should be a text")
             out[key] = value
         else:
@@ -140,19 +147,21 @@ def parse_mapping(text: str, name: str) -> Mapping:
 
 def find_mapping(motion: Motion) -> Mapping:
     """The shipped mapping that names joints of this motion only. Raises MappingError when none does."""
+    missing: dict[str, list[str]] = {}
     for name in SHIPPED:
         mapping = read_mapping(name)
-        if mapping.fits(motion) and (name != "mixamo" or not _bones_along_x(motion)):
+        missing[name] = mapping.missing(motion)
+        if not missing[name] and (name != "mixamo" or not _bones_along_x(mapping.plain(motion))):
             return mapping
-    has = {n.rpartition(":")[2] for n in motion.joint_names} | set(motion.joint_names)
-    missing = {name: sorted(set(read_mapping(name).joints()) - has) for name in SHIPPED}
     near = min(SHIPPED, key=lambda name: len(missing[name]))
-    lacks = f"{', '.join(missing[near][:4])}{', ...' if len(missing[near]) > 4 else ''}"
     raise MappingError(
-        f"unknown joints: of the shipped mappings {near} comes nearest, and lacks {lacks}; "
-        f"write one and give it. The motion has {', '.join(motion.joint_names[:8])}"
-        f"{', ...' if len(motion.joint_names) > 8 else ''}"
+        f"unknown joints: of the shipped mappings {near} comes nearest, and lacks {_some(missing[near])}; "
+        f"write one and give it. The motion has {_some(motion.joint_names)}"
     )
+
+
+def _some(names: Sequence[str], most: int = 12) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _bones_along_x(motion: Motion) -> bool:

@@ -1,8 +1,8 @@
-from dataclasses import replace
-
+import numpy as np
 import pytest
 
 from warpdribble.clips.read import read_clip
+from warpdribble.sims.recording.motion import Motion
 from warpdribble.sims.retarget.mapping import SHIPPED, MappingError, find_mapping, parse_mapping, read_mapping
 
 SMALL = """
@@ -32,27 +32,77 @@ def test_the_mapping_is_told_from_the_clip(mocap, clip, name):
     assert find_mapping(read_clip(mocap / clip)[0]).name == name
 
 
-def test_a_prefix_may_be_there_or_not(mocap):
-    motion, _ = read_clip(mocap / "cmu" / "06_01.bvh")
-    mapping = replace(read_mapping("cmu"), prefix="rig:")
-    named = replace(motion, joint_names=tuple("rig:" + n for n in motion.joint_names))
-    assert mapping.fits(motion) and mapping.fits(named)
-    assert mapping.plain(named).joint_names == motion.joint_names
+def still(names, bones=None):
+    """Two frames of a skeleton with these names, all below the first, at a place of its own each."""
+    names = tuple(names)
+    offsets = np.random.default_rng(0).uniform(-0.1, 0.1, (len(names), 3)) if bones is None else bones(names)
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (2, len(names), 1))
+    parents = np.array([-1] + [0] * (len(names) - 1))
+    return Motion(names, parents, offsets, turns, np.zeros((2, 3)), 60.0, turns[0])
+
+
+def joints(name):
+    return sorted({*read_mapping(name).joints()})
+
+
+SPACES = (
+    "mixamorig:",
+    "mixamorig1:",
+    "Character1:",
+    "mixamorig_",
+    "Character1_",
+    "mixamorig",
+    "a:rig:",
+    "me|",
+    "x y ",
+)
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("name", ["mixamo", "cmu"])
+def test_any_namespace_is_taken_off(name, space):
+    motion = still([*(space + joint for joint in joints(name)), "Sword", "Camera"])
+    assert find_mapping(motion).name == name
+    assert {*joints(name), "Sword"} <= set(find_mapping(motion).plain(motion).joint_names)
+
+
+def test_a_namespace_may_differ_from_joint_to_joint_and_from_the_mapping_s():
+    motion = still(f"{'ab'[i % 2]}:{joint}" for i, joint in enumerate(joints("mixamo")))
+    assert find_mapping(motion).name == "mixamo"
+    words = SMALL.replace('"Hips"', '"me:Hips"')
+    for letter in "ABCDEF":
+        words = words.replace(f'"{letter}"', f'"me:{letter}"')
+    own = parse_mapping(words, "mine.toml")
+    assert own.plain(still(f"you:{n}" for n in ("Hips", *"ABCDEF"))).joint_names[1] == "me:A"
+
+
+def test_lafan_is_told_from_mixamo_below_a_namespace():
+    assert (
+        find_mapping(
+            still((f"rig:{n}" for n in joints("lafan")), lambda n: np.tile([0.1, 0, 0], (len(n), 1)))
+        ).name
+        == "lafan"
+    )
+
+
+@pytest.mark.parametrize("space", ["", "mixamorig1:"])
+def test_all_that_is_missing_is_listed(space):
+    names = [space + joint for joint in joints("mixamo") if joint not in ("Spine2", "RightArm")]
+    with pytest.raises(
+        MappingError, match=r"mixamo comes nearest, and lacks (Spine2, RightArm|RightArm, Spine2);"
+    ):
+        find_mapping(still(names))
+    with pytest.raises(MappingError, match=r"no joint 'Spine2' in this motion, nor RightArm; it has "):
+        read_mapping("mixamo").plain(still(names))
 
 
 def test_lafan_and_mixamo_share_names_and_are_told_apart_by_their_bones():
-    import numpy as np
-
-    from warpdribble.sims.recording.motion import Motion
-
-    names = sorted({*read_mapping("mixamo").joints()}, key=lambda n: n != "Hips")
-    parents = np.array([-1] + [0] * (len(names) - 1))
+    names = joints("mixamo")
 
     def motion(offset):
         offsets = np.tile([0.1, 0.0, 0.0], (len(names), 1))
         offsets[names.index("LeftForeArm")] = offset
-        still = np.tile([0.0, 0.0, 0.0, 1.0], (2, len(names), 1))
-        return Motion(tuple(names), parents, offsets, still, np.zeros((2, 3)), 60.0, still[0])
+        return still(names, lambda _: offsets)
 
     assert find_mapping(motion([0.2, 0.0, 0.0])).name == "lafan"
     assert find_mapping(motion([0.0, 0.2, 0.0])).name == "mixamo"
@@ -65,7 +115,7 @@ def test_lafan_and_mixamo_share_names_and_are_told_apart_by_their_bones():
         (('["A", "B", "C"]', '["A", "B"]'), r"arms\.l_elbow: should be a list of 3"),
         (('pelvis = "Hips"', "pelvis = 3"), r"bodies\.pelvis: should be the name"),
         (("[bodies]", 'rest = "lying"\n[bodies]'), "rest: recorded or directions"),
-        (("[bodies]", "prefix = 1\n[bodies]"), "prefix: should be a text"),
+        (("[bodies]", "description = 1\n[bodies]"), "description: should be a text"),
         (('[legs]\nl_knee = ["D", "E", "F"]\n', ""), "legs: missing"),
         (("[bodies]", "[bodies"), "not TOML"),
         (("[legs]", "[smoothed]\nl_hand = -1\n[legs]"), r"smoothed\.l_hand: should be a frequency"),
