@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..sims.recording.motion import Motion
+from ..sims.recording.names import bare
 from .bvh_places import carried, replaced
 from .bvh_text import BvhText, Joint, read_bvh_text
 from .errors import ClipError
@@ -46,13 +47,13 @@ def read_bvh(
     rate, said = given_rate(rate) if rate is not None else rate_of(path, file.frame_time)
     offsets = np.array([joint.offset for joint in file.joints])
     check_numbers(path, rows=file.rows, offsets=offsets)
-    special = None
-    if set(names) >= CMU_JOINTS:
-        special = (CMU_UNIT, "CMU conversion")
-        repaired = repair_cmu_offsets(names, offsets)
-        if repaired:
-            notes.append(f"CMU conversion: lost bone lengths put back at {', '.join(repaired)}")
     rotations, steps = _rotations(path, file), _steps(file, offsets)
+    special = None
+    if set(plain := list(bare(names))) >= CMU_JOINTS:
+        special = (CMU_UNIT, "CMU conversion")
+        if repaired := repair_cmu_offsets(plain, offsets):
+            notes.append(f"CMU conversion: lost bone lengths put back at {', '.join(repaired)}")
+            steps = {joint: step for joint, step in steps.items() if plain[joint] not in repaired}
     rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(names), 1))
     if _is_added_pose(file):
         rest, rotations = rotations[0], rotations[1:]

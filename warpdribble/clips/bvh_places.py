@@ -17,8 +17,6 @@ from ..sims.trees import below
 
 NOTHING = 1e-3
 """Share of the way from the root to the farthest end that counts as no difference: 1 mm or so."""
-MOVES = 0.05
-"""Share of the same way by which hips that are carried move at least; less is a bone that gives."""
 ADDED = 0.2
 """Positions that are smaller than this share of what they differ from the offsets are added to these."""
 
@@ -36,10 +34,10 @@ class Apart:
 
     def said(self, scale: float, used: bool) -> str:
         """A note; scale: metres per file unit."""
-        some = f"{', '.join(self.joints[:3])}{', ...' if len(self.joints) > 3 else ''}"
+        more = f" and {len(self.joints) - 3} more" if len(self.joints) > 3 else ""
         how = "recorded places" if self.moving else "lengths of the bones"
         return (
-            f"positions of {len(self.joints)} joints ({some}) differ from their offsets, by up to "
+            f"positions of {', '.join(self.joints[:3])}{more} differ from their offsets, by up to "
             f"{100.0 * scale * self.distance:.3g} cm at {self.worst}: "
             f"{f'used as {how}' if used else 'dropped'}"
         )
@@ -52,10 +50,11 @@ def carried(motion: Motion, steps: dict[int, np.ndarray]) -> tuple[Motion, dict[
     the steps by their new numbers, and a note or "".
     """
     chain = _carriers(motion)
-    moving = [i for i, j in enumerate(chain) if j in steps and _extent(steps[j]) > MOVES * reach(motion)]
-    if not moving:
+    least = NOTHING * reach(motion)
+    moved = [i for i, j in enumerate(chain) if j in steps and _apart(motion, j, steps[j]) > least]
+    if not moved:
         return motion, steps, ""
-    chain = chain[: moving[-1] + 1]
+    chain = chain[: moved[-1] + 1]
     kept = below(motion.parents, chain[-1])
     place = motion.root_position
     turn, rest = (Rotation.from_quat(r[..., 0, :]) for r in (motion.rotations, motion.rest_rotations))
@@ -98,7 +97,7 @@ def replaced(motion: Motion, steps: dict[int, np.ndarray], used: bool) -> tuple[
     """The motion with the positions used, or not; how far they are from its offsets, and a note or ""."""
     said = ""
     joints = list(steps)
-    apart = {j: np.linalg.norm(steps[j] - motion.offsets[j], axis=1).max() for j in joints}
+    apart = {j: _apart(motion, j, steps[j]) for j in joints}
     size = {j: np.linalg.norm(steps[j], axis=1).max() for j in joints}
     if sum(size.values()) < ADDED * sum(apart.values()):
         said = "positions are small: taken as added to the offsets"
@@ -111,7 +110,7 @@ def replaced(motion: Motion, steps: dict[int, np.ndarray], used: bool) -> tuple[
     worst = max(differ, key=lambda j: apart[j])
     moving = any(_extent(steps[j]) > least for j in differ)
     names = tuple(motion.joint_names[j] for j in differ)
-    found = Apart(names, motion.joint_names[worst], float(apart[worst]), moving)
+    found = Apart(names, motion.joint_names[worst], apart[worst], moving)
     if not used:
         return motion, found, said
     offsets = motion.offsets.copy()
@@ -130,6 +129,10 @@ def reach(motion: Motion) -> float:
     for joint in range(1, len(lengths)):
         along[joint] = along[motion.parents[joint]] + lengths[joint]
     return float(along.max())
+
+
+def _apart(motion: Motion, joint: int, step: np.ndarray) -> float:
+    return float(np.linalg.norm(step - motion.offsets[joint], axis=1).max())
 
 
 def _extent(step: np.ndarray) -> float:

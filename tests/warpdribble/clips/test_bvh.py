@@ -1,7 +1,10 @@
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.warpdribble.conftest import skeleton
 from warpdribble.clips.bvh import read_bvh
 from warpdribble.clips.errors import ClipError
 from warpdribble.clips.space import CMU_UNIT
@@ -75,6 +78,38 @@ def test_lost_lengths_are_put_back_and_others_left(cmu_clip):
     assert length(motion, "LeftFingerBase") == pytest.approx(0.5 * length(motion, "LeftHand"))
     assert length(motion, "RightShoulder") == pytest.approx(0.115, abs=0.01)
     assert length(motion, "LHipJoint") == length(motion, "LowerBack") == 0.0
+
+
+def test_the_conversion_is_known_in_any_namespace_and_with_positions_everywhere(cmu_clip):
+    wanted, notes = read_bvh(cmu_clip)
+    text = re.sub(r"(ROOT|JOINT) ", r"\1 me1:", cmu_clip.read_text())
+    text = text.replace("CHANNELS 3", "CHANNELS 6 Xposition Yposition Zposition")
+    offsets = [" ".join(map(str, one)) for one in (offset for _, offset in skeleton().values())]
+    lines = text.splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("Frame Time")) + 1
+    for i, line in enumerate(lines[first:], first):
+        words = line.split()
+        turns = [" ".join(words[j : j + 3]) for j in range(6, len(words), 3)]
+        bones = [f"{place} {turn}" for place, turn in zip(in_order(offsets), turns, strict=True)]
+        lines[i] = " ".join([*words[:6], *bones])
+    cmu_clip.write_text("\n".join(lines) + "\n")
+    motion, said = read_bvh(cmu_clip)
+    assert said == notes and motion.positions is None
+    assert motion.joint_names[0] == "me1:Hips"
+    assert np.allclose(motion.forward()[0], wanted.forward()[0], atol=1e-5)
+
+
+def in_order(offsets):
+    """Of the joints below the root, as the file has them: depth first."""
+    names, parents = list(skeleton()), [parent for parent, _ in skeleton().values()]
+
+    def below(name):
+        for i, parent in enumerate(parents):
+            if parent == name:
+                yield offsets[i]
+                yield from below(names[i])
+
+    return list(below("Hips"))
 
 
 def test_centimetres_are_told_from_metres(cmu_clip, tmp_path):
