@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 
 def below(parents: Iterable[int], node: int) -> list[int]:
@@ -12,3 +14,14 @@ def below(parents: Iterable[int], node: int) -> list[int]:
         if parent in found:
             found.add(child)
     return sorted(found)
+
+
+def path(parents: Sequence[int] | np.ndarray, top: int, end: int) -> list[int]:
+    """The nodes from `top` down to `end`, both included; empty where `end` does not hang from `top`."""
+    nodes = [end]
+    while nodes[-1] != top:
+        above = int(parents[nodes[-1]])
+        if above < 0:
+            return []
+        nodes.append(above)
+    return nodes[::-1]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..trees import below
+from ..trees import below, path
 from .names import bare
 
 PARTS = {
@@ -41,7 +41,8 @@ def parts(names: Sequence[str], parents: np.ndarray) -> dict[str, int]:
         if f"{side}_wrist" in found:
             found[f"{side}_hand"] = _finger_tip(names, parents, found[f"{side}_wrist"])
         if f"{side}_toe" in found:
-            found[f"{side}_toe_tip"] = below(parents, found[f"{side}_toe"])[-1]
+            toe = found[f"{side}_toe"]
+            found[f"{side}_toe_tip"] = _farthest(names, parents, toe, below(parents, toe))
     if ("", "head") in plain:
         found["head"] = plain.index(("", "head"))
     return found
@@ -80,5 +81,10 @@ def _finger_tip(names: Sequence[str], parents: np.ndarray, wrist: int) -> int:
     for word in ("middle", "index", ""):
         chain = [j for j in hand if word in names[j].lower() and "thumb" not in names[j].lower()]
         if chain:
-            return chain[-1]
+            return _farthest(names, parents, wrist, chain)
     return wrist
+
+
+def _farthest(names: Sequence[str], parents: np.ndarray, top: int, joints: list[int]) -> int:
+    """The joint with most joints between it and `top`; the same one in whatever order a file has them."""
+    return max(joints, key=lambda j: (len(path(parents, top, j)), names[j]))

@@ -32,6 +32,20 @@ def test_a_collar_bone_is_no_shoulder_and_the_longest_finger_is_the_hand():
     }
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_order_of_the_joints_does_not_matter(seed):
+    """A foot and a hand that branch, in any order that has parents first."""
+    tree = {"Hips": None, "LeftFoot": "Hips", "LeftToeBase": "LeftFoot", "LeftHeel": "LeftFoot"}
+    tree |= {"LeftToeBig": "LeftToeBase", "LeftToeBig_end": "LeftToeBig", "LeftToeSmall": "LeftToeBase"}
+    tree |= {"LeftHand": "Hips", "LeftHandThumb1": "LeftHand", "LeftHandRing1": "LeftHand"}
+    tree |= {"LeftHandRing2": "LeftHandRing1", "LeftHandThumb2": "LeftHandThumb1"}
+    rng, names = np.random.default_rng(seed), ["Hips"]
+    while len(names) < len(tree):
+        names.append(rng.choice([n for n in tree if n not in names and tree[n] in names]))
+    found = parts(names, [-1, *(names.index(tree[n]) for n in names[1:])])
+    assert names[found["left_toe_tip"]] == "LeftToeBig_end" and names[found["left_hand"]] == "LeftHandRing2"
+
+
 def test_leftward():
     places = np.array([[0.0, 0, 1], [0, 0.1, 1], [0, -0.1, 1]])
     found = parts(["Hips", "LeftUpLeg", "RightUpLeg"], [-1, 0, 0])
