@@ -13,6 +13,7 @@ from ..model import Model
 from ..recording.motion import Motion
 from ..recording.names import bare
 
+RESTS = ("told", "recorded", "directions")
 SHIPPED = ("cmu", "ballplay", "mixamo", "lafan")
 
 
@@ -38,8 +39,8 @@ class Mapping:
     """Hand -> wrist, index, middle and little knuckle, whose places are trusted more than rotations."""
     smoothed: dict[str, float] = field(default_factory=dict)
     """Body -> cut-off [Hz] of a low-pass filter, for joints the recording shows with noise."""
-    rest: Literal["recorded", "directions"] = "recorded"
-    """The T-pose: as the motion has it, or built from the directions of its bones."""
+    rest: Literal["told", "recorded", "directions"] = "told"
+    """The T-pose: told from where the bones point, as the motion has it, or built from their directions."""
     description: str = ""
 
     @property
@@ -141,7 +142,7 @@ def parse_mapping(text: str, name: str) -> Mapping:
         else:
             _expect(isinstance(value, dict), name, key, "should be a table")
             out[key] = {k: _entry(name, key, k, v) for k, v in value.items()}
-    _expect(out.get("rest", "recorded") in ("recorded", "directions"), name, "rest", "recorded or directions")
+    _expect(out.get("rest", "told") in RESTS, name, "rest", ", ".join(RESTS))
     return Mapping(**out)
 
 
@@ -151,7 +152,7 @@ def find_mapping(motion: Motion) -> Mapping:
     for name in SHIPPED:
         mapping = read_mapping(name)
         missing[name] = mapping.missing(motion)
-        if not missing[name] and (name != "mixamo" or not _bones_along_x(mapping.plain(motion))):
+        if not missing[name]:
             return mapping
     near = min(SHIPPED, key=lambda name: len(missing[name]))
     raise MappingError(
@@ -162,17 +163,6 @@ def find_mapping(motion: Motion) -> Mapping:
 
 def _some(names: Sequence[str], most: int = 12) -> str:
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
-def _bones_along_x(motion: Motion) -> bool:
-    """LAFAN1 and Mixamo share their joints' names; in LAFAN1 thigh, shank and upper arm all lie along one
-    axis of their joint."""
-    names = ("LeftLeg", "LeftFoot", "RightLeg", "RightFoot", "LeftForeArm", "RightForeArm")
-    offsets = motion.offsets[[motion.joint_names.index(n) for n in names if n in motion.joint_names]]
-    if len(offsets) < len(names):
-        return False
-    directions = offsets / ((offsets**2).sum(axis=1, keepdims=True) ** 0.5 + 1e-12)
-    return float((directions @ directions[0]).min()) > 0.98
 
 
 def _entry(name: str, table: str, key: str, value: Any) -> Any:

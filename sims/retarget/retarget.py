@@ -9,7 +9,7 @@ Places are the recording's, scaled by the length of the legs, with the ground br
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,10 +20,11 @@ from ..model import Model, pose
 from ..recording.motion import Motion
 from ..reference.reference import Reference
 from ..signals import low_pass_rotations
-from .calibrate import match_limbs, rest_by_directions, since_rest
+from .calibrate import match_limbs, since_rest
 from .mapping import Mapping, find_mapping
 from .planting import Foot, Stand, find_foot, find_stands, planted, sole_heights
 from .reach import elbow_axis, keep_range, lift_out, lower_root, reach, shrug
+from .tpose import t_pose
 
 GROUND = (1.6, 0.3)
 """[s] The ground is the lowest that the soles come within the first time, smoothed over the second."""
@@ -45,6 +46,8 @@ class Retargeted:
     """Foot -> its stands."""
     lowered: np.ndarray | None = None
     """(frames,) [m] by which the root went down for the legs to reach."""
+    notes: tuple[str, ...] = ()
+    """What was guessed or put right of the recording's T-pose."""
 
 
 def retarget(model: Model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Reference:
@@ -62,8 +65,7 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
     mapping = mapping or find_mapping(motion)
     mapping.check_model(model)
     motion = mapping.plain(motion).resample(1.0 / model.timestep)
-    if mapping.rest == "directions":
-        motion = rest_by_directions(model, motion, mapping)
+    motion, notes = t_pose(model, motion, mapping)
     positions, frames = motion.forward()
     positions = positions if motion.positions is None else motion.positions
     scale = leg_scale(model, motion, mapping)
@@ -78,7 +80,7 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
     ground = _ground(model, joint_q, goals, feet)
     joint_q[:, model.q_slice(model.root).start + 2] -= ground
     goals = {body: goal - ground[:, None] * [0.0, 0.0, 1.0] for body, goal in goals.items()}
-    out = Retargeted(Reference(joint_q, model.timestep), mapping, scale, goals, ground)
+    out = Retargeted(Reference(joint_q, model.timestep), mapping, scale, goals, ground, notes=notes)
     return _with_ik(model, out, feet, knees) if ik else out
 
 
@@ -125,7 +127,7 @@ def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[s
         turn = Rotation.from_quat(body_q[:, hand, 3:])
         reach(model, joint_q, elbow, places[2], turn, axis)
         lift_out(model, joint_q, elbow, places[2], model.descendants(hand))
-    return Retargeted(out.reference, out.mapping, out.scale, out.goals, out.ground, stands, lowered)
+    return replace(out, stands=stands, lowered=lowered)
 
 
 def _place_foot(

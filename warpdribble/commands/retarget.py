@@ -39,7 +39,7 @@ class Retarget(ClipInput):
         mapping = read_mapping(self.mapping) if self.mapping else find_mapping(motion)
         result = retargeted(model, motion, mapping, self.ik)
         say(f"clip        {self.clip}, {motion.frame_count} frames, {motion.duration:.2f} s")
-        for note in notes:
+        for note in (*notes, *result.notes):
             say(f"            {note}")
         say(f"onto        {model.name} with the mapping {mapping.name}, lengths times {result.scale:.3f}")
         for line in _table(accuracy(model, result)):

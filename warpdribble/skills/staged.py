@@ -160,7 +160,7 @@ def _recorded(
         ball = recorded_ball(model, result, motion)
         if ball is None or not ball.touch.any():
             ball = inferred_ball(model, result.reference)
-    notes = [*notes, f"joints {accuracy(model, result).summary}"]
+    notes = [*notes, *result.notes, f"joints {accuracy(model, result).summary}"]
     return result.reference, ball, notes
 
 

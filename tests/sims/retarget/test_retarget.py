@@ -190,42 +190,6 @@ def test_joint_frames_do_not_matter(player, dribble):
     assert np.abs(pose.forward(player, ours) - pose.forward(player, theirs))[..., :3].max() < 1e-6
 
 
-def test_a_t_pose_is_built_from_directions(player, dribble):
-    """LAFAN1's form: the pose at zero angles is no T-pose. Every bone of it lies along its joint's X axis."""
-    _, world = dribble.forward()
-    at_rest, _ = dribble.rest()
-    count = len(dribble.joint_names)
-    bones = [next((k for k in range(count) if dribble.parents[k] == j), None) for j in range(count)]
-    _, rest_world = dribble.rest()
-    turns = []
-    for j in range(count):
-        line = at_rest[bones[j]] - at_rest[j] if bones[j] is not None else np.zeros(3)
-        line = Rotation.from_quat(rest_world[j]).inv().apply(line)
-        x = line / np.linalg.norm(line) if np.linalg.norm(line) > 1e-9 else np.array([0.0, 0.0, 1.0])
-        left = np.array([0.0, 1.0, 0.0]) if abs(x[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
-        own = pose.frame_of(x, left)
-        turns.append(turns[0] if dribble.joint_names[j] in ("LHipJoint", "RHipJoint") else own)
-    frames = [Rotation.from_quat(world[:, j]) * turns[j] for j in range(count)]
-    local, offsets = [frames[0]], dribble.offsets.copy()
-    for j in range(1, count):
-        local.append(frames[dribble.parents[j]].inv() * frames[j])
-        offsets[j] = turns[dribble.parents[j]].inv().apply(dribble.offsets[j])
-    lying = replace(
-        dribble,
-        rotations=np.stack([r.as_quat() for r in local], axis=1),
-        offsets=offsets,
-        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
-    )
-    mapping = replace(read_mapping("cmu"), rest="directions")
-    ours = pose.forward(player, retarget(player, dribble).joint_q)
-    theirs = pose.forward(player, retarget(player, lying, mapping).joint_q)
-    for body in ("pelvis", "torso", "head", "l_hand", "r_hand", "l_foot", "r_foot", "l_lower_leg"):
-        apart = np.linalg.norm((ours - theirs)[:, player.body(body), :3], axis=1)
-        assert apart.mean() < 0.05, body
-    plain = pose.forward(player, retarget(player, lying, read_mapping("cmu"), ik=False).joint_q)
-    assert np.linalg.norm((ours - plain)[:, player.body("head"), :3], axis=1).mean() > 0.2
-
-
 @pytest.mark.parametrize("turns", [3.0, -3.0])
 def test_hands_stay_on_through_three_full_turns(player, turns):
     """Hands are low-passed, and their heading passes half a turn: they still only turn with the body."""
