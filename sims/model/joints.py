@@ -53,6 +53,12 @@ class Joint:
     driven: bool
     armature: float
     """[kg m^2]"""
+    damping: float
+    """[N m s/rad] that no effort limit bounds."""
+    stiffness: float
+    """[N m/rad] of its spring, 0 without one."""
+    rest: np.ndarray
+    """Its coordinates where the spring is at rest."""
     com: np.ndarray
     """(3,) [m], centre of mass of the own link."""
 

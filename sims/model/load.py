@@ -93,6 +93,7 @@ def read_model(
         "start_q": keyframes.get("start", _order(m, m.qpos0)).copy(),
         "tables": tables,
         "pairs": pairs,
+        "excluded": [(int(two >> 16) - 1, int(two & 0xFFFF) - 1) for two in m.exclude_signature],
         "notes": notes + drives.notes,
     }
 

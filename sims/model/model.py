@@ -60,6 +60,8 @@ class Model:
     """arrays for `kernels.tree.Tree`, by its field names"""
     pairs: list[Pair]
     """contact properties per pair of shapes"""
+    excluded: list[tuple[int, int]]
+    """pairs of bodies, by index and -1 for the world, that the file keeps from touching"""
     notes: list[str] = field(default_factory=list)
 
     @staticmethod
@@ -192,6 +194,9 @@ class Model:
             effort=float(t["link_effort"][link]),
             driven=bool(t["link_driven"][link]),
             armature=float(t["dof_armature"][dof]),
+            damping=float(t["dof_damping"][dof]),
+            stiffness=float(t["dof_stiffness"][dof]),
+            rest=t["q_spring"][q : q + Q_SIZE[kind]],
             com=t["link_com"][link],
         )
 

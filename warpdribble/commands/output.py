@@ -45,6 +45,7 @@ def write_outputs(
     """Write all of it and say where. source: where the motion comes from; root: what holds the root."""
     from .. import __version__
     from ..takes import Take, validate, write_plots, write_sheet, write_take
+    from ..takes.usdjoints import left_out
     from ..web import write_replay
 
     take = Take.of(
@@ -74,6 +75,8 @@ def write_outputs(
         write_replay(replay, take, tracking.contacts, title, skin=command.skin)
     errors = validate(command.out)
     state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
+    for lost in left_out(model, command.usd_joints):
+        say(f"          not in the take, for want of a word in USD: {lost}")
     say(f"take      {command.out} ({len(take.body_q)} frames at {take.fps:g} fps, {state})")
     say(f"pictures  {picture}, {plots.name}")
     if command.html:

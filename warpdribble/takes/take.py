@@ -20,6 +20,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 from ..sims.files import check_folder, whole
 from ..sims.model import Model, Shape
 from . import crowd, figure, scene
+from .usdjoints import left_out
 
 SUFFIXES = (".usda", ".usdc", ".usdz")
 LAYERS = {"animation": "usdc", "physics": "usda", "scene": "usdc"}
@@ -168,7 +169,9 @@ def _write(path: Path, take: Take, skin: bool, joints: str, layered: bool, spaci
     frames = take.worlds.shape[1]
     for layer in {root, *layers.values()}:
         scene.set_metadata(layer, frames, take.fps)
-    root.customLayerData = {str(k): str(v) for k, v in take.notes.items()}
+    lost = left_out(take.model, joints) if take.model else []
+    notes = take.notes | ({"left out": "; ".join(lost)} if lost else {})
+    root.customLayerData = {str(k): str(v) for k, v in notes.items()}
 
     edit = {name: Usd.EditTarget(layer) for name, layer in layers.items()}
     stage.SetEditTarget(edit["scene"])

@@ -9,12 +9,16 @@ d6
     one PhysicsJoint with locked translations, three limits and three drives: Omniverse, Isaac, Newton.
 spherical
     one SphericalJoint with a cone limit; the schema has no drive for it.
+
+A spring and a damper are a drive too, one without a limit to its torque. Beside a servo that has a limit the
+damper is `newton:damping`, and the spring is among what is `left_out`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
@@ -30,8 +34,19 @@ PER_DEGREE = np.pi / 180.0
 AXES = "XYZ"
 Ends = tuple[str | None, str]
 """Paths of the bodies that a joint ties: the parent's, None for the world, and the child's."""
-Gains = tuple[float, float, float]
-"""kp [N m/rad], kd [N m s/rad], effort [N m], ANYWHERE where it has no limit."""
+
+
+class Drive(NamedTuple):
+    """Of one axis: a torque kp (target - angle) - kd rate."""
+
+    kp: float
+    """[N m/rad]"""
+    kd: float
+    """[N m s/rad]"""
+    effort: float
+    """[N m], ANYWHERE where the torque has no limit"""
+    target: float
+    """[rad]"""
 
 
 @dataclass(frozen=True)
@@ -83,6 +98,42 @@ def add(
             _add_joint(stage, path, model, joint, ends, frame0, frame1, turn, kind)
 
 
+def left_out(model: Model, kind: str) -> list[str]:
+    """What a model has and joints of a kind cannot say, a line each; empty where they say all."""
+    lost = {
+        "passive damping": [j.name for j in model.joints if j.kind == "free" and j.damping > 0.0],
+        "armature": [j.name for j in model.joints if j.kind == "free" and j.armature > 0.0],
+        "servo": [j.name for j in model.joints if _mute(j, kind) and j.kp > 0.0],
+        "spring": [j.name for j in model.joints if j.stiffness > 0.0 and (_mute(j, kind) or _capped(j))],
+    }
+    return [f"{what} of {_some(names)}" for what, names in lost.items() if names]
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} others" if len(names) > 3 else "")
+
+
+def _mute(joint: Joint, kind: str) -> bool:
+    """Whether a joint is of a schema that has no drive."""
+    return kind == "spherical" and joint.kind == "ball"
+
+
+def _capped(joint: Joint) -> bool:
+    """Whether a joint has a servo with an effort limit, which does not bound its spring and damper."""
+    return joint.kp > 0.0 and joint.effort < ANYWHERE
+
+
+def _drive_of(joint: Joint, angle: float, rest: float) -> Drive | None:
+    """The drive of one axis: the servo holds `angle`, the spring pulls to `rest` [rad]."""
+    if _capped(joint):
+        return Drive(joint.kp, joint.kd, joint.effort, angle)
+    kp, kd = joint.kp + joint.stiffness, joint.kd + joint.damping
+    if kp == 0.0 and kd == 0.0:
+        return None
+    target = (joint.kp * angle + joint.stiffness * rest) / kp if kp > 0.0 else angle
+    return Drive(kp, kd, ANYWHERE, target)
+
+
 def is_static(model: Model, body: int) -> bool:
     """Whether a body is welded to the world."""
     return bool(model.body_link[body] == 0)
@@ -122,34 +173,44 @@ def _add_joint(
     turn: Rotation,
     kind: str,
 ) -> None:
-    gains = (joint.kp, joint.kd, joint.effort) if joint.kp > 0.0 else None
     limits, armature = joint.limits, joint.armature
+    damping = joint.damping if _capped(joint) or _mute(joint, kind) else 0.0
     at_start = frame0.R.inv() * turn * frame1.R
     if joint.kind != "ball":
         axis = Rotation.align_vectors([joint.axis], [[1.0, 0.0, 0.0]])[0]
-        angle = float((axis.inv() * at_start * axis).as_rotvec()[0])
         limits = limits and (limits[0] - joint.zero, limits[1] - joint.zero)
-        _revolute(stage, path, ends, frame0, frame1, axis, limits, gains, angle)
-        _extend(stage.GetPrimAtPath(path), armature, angle)
+        rest = float(joint.rest[0]) - joint.zero
+        near = float(np.mean(limits)) if limits else rest if joint.stiffness > 0.0 else 0.0
+        angle = _nearest(float((axis.inv() * at_start * axis).as_rotvec()[0]), near)
+        _revolute(stage, path, ends, frame0, frame1, axis, limits, _drive_of(joint, angle, rest))
+        _extend(stage.GetPrimAtPath(path), armature, damping, angle)
         return
-    euler = at_start.as_euler("XYZ")
+    euler = zip(at_start.as_euler("XYZ"), Rotation.from_quat(joint.rest).as_euler("XYZ"), strict=True)
+    drives = [_drive_of(joint, float(angle), float(rest)) for angle, rest in euler]
     reach = limits and limits[1]
     if kind == "revolute":
-        for k, angle in enumerate(euler):
+        for k, drive in enumerate(drives):
             axis = Rotation.align_vectors([np.eye(3)[k]], [[1.0, 0.0, 0.0]])[0]
             both = None if reach is None else (-reach, reach)
             part = f"{path}_{AXES[k].lower()}"
-            _revolute(stage, part, ends, frame0, frame1, axis, both, gains, angle)
-            _extend(stage.GetPrimAtPath(part), armature)
+            _revolute(stage, part, ends, frame0, frame1, axis, both, drive)
+            _extend(stage.GetPrimAtPath(part), armature, damping)
     elif kind == "d6":
-        _d6(stage, path, ends, frame0, frame1, reach, gains, euler)
-        _extend(stage.GetPrimAtPath(path), armature)
+        _d6(stage, path, ends, frame0, frame1, reach, drives)
+        _extend(stage.GetPrimAtPath(path), armature, damping)
     else:
         spherical = _joint(stage, UsdPhysics.SphericalJoint, path, ends, frame0, frame1)
         spherical.CreateAxisAttr(_bone_axis(model, joint))
         if reach is not None:
             spherical.CreateConeAngle0LimitAttr(min(np.degrees(reach), 179.0))
             spherical.CreateConeAngle1LimitAttr(min(np.degrees(reach), 179.0))
+        if damping > 0.0:
+            _extend(spherical.GetPrim(), armature, damping)
+
+
+def _nearest(angle: float, near: float) -> float:
+    """An angle [rad] by whole turns as near to another as can be: poses do not tell 230 degrees from -130."""
+    return angle + 2.0 * np.pi * round((near - angle) / (2.0 * np.pi))
 
 
 def _joint(
@@ -174,8 +235,7 @@ def _revolute(
     frame1: Frame,
     axis: Rotation,
     limits: tuple[float, float] | None,
-    gains: Gains | None,
-    angle: float,
+    drive: Drive | None,
 ) -> None:
     aside = Frame(np.zeros(3), axis)
     joint = _joint(stage, UsdPhysics.RevoluteJoint, path, ends, frame0 @ aside, frame1 @ aside)
@@ -183,7 +243,7 @@ def _revolute(
     if limits:
         joint.CreateLowerLimitAttr(float(np.degrees(limits[0])))
         joint.CreateUpperLimitAttr(float(np.degrees(limits[1])))
-    _drive(joint.GetPrim(), "angular", gains, angle)
+    _drive(joint.GetPrim(), "angular", drive)
 
 
 def _d6(
@@ -193,11 +253,10 @@ def _d6(
     frame0: Frame,
     frame1: Frame,
     reach: float | None,
-    gains: Gains | None,
-    euler: np.ndarray,
+    drives: Sequence[Drive | None],
 ) -> None:
     prim = _joint(stage, UsdPhysics.Joint, path, ends, frame0, frame1).GetPrim()
-    for k, axis in enumerate(AXES):
+    for axis, drive in zip(AXES, drives, strict=True):
         lock = UsdPhysics.LimitAPI.Apply(prim, f"trans{axis}")
         lock.CreateLowAttr(1.0)
         lock.CreateHighAttr(-1.0)
@@ -205,34 +264,39 @@ def _d6(
             limit = UsdPhysics.LimitAPI.Apply(prim, f"rot{axis}")
             limit.CreateLowAttr(float(-np.degrees(reach)))
             limit.CreateHighAttr(float(np.degrees(reach)))
-        _drive(prim, f"rot{axis}", gains, euler[k])
+        _drive(prim, f"rot{axis}", drive)
 
 
-def _drive(prim: Usd.Prim, where: str, gains: Gains | None, angle: float) -> None:
-    """A force drive to `angle` [rad]."""
-    if gains is None:
+def _drive(prim: Usd.Prim, where: str, pull: Drive | None) -> None:
+    """A force drive."""
+    if pull is None:
         return
     drive = UsdPhysics.DriveAPI.Apply(prim, where)
     drive.CreateTypeAttr("force")
-    drive.CreateStiffnessAttr(gains[0] * PER_DEGREE)
-    drive.CreateDampingAttr(gains[1] * PER_DEGREE)
-    if gains[2] < ANYWHERE:
-        drive.CreateMaxForceAttr(gains[2])
-    drive.CreateTargetPositionAttr(float(np.degrees(angle)))
+    drive.CreateStiffnessAttr(pull.kp * PER_DEGREE)
+    drive.CreateDampingAttr(pull.kd * PER_DEGREE)
+    if pull.effort < ANYWHERE:
+        drive.CreateMaxForceAttr(pull.effort)
+    drive.CreateTargetPositionAttr(float(np.degrees(pull.target)))
     drive.CreateTargetVelocityAttr(0.0)
 
 
-def _extend(prim: Usd.Prim, armature: float, angle: float | None = None) -> None:
-    """What the schema has no word for, in the words of engines: armature [kg m^2], and for MuJoCo the angle
-    [rad] at which a hinge starts, without which it would count limits from there."""
-    said = {
-        "NewtonJointAPI": ("newton:armature", Sdf.ValueTypeNames.Float, armature),
-        "PhysxJointAPI": ("physxJoint:armature", Sdf.ValueTypeNames.Float, armature),
-    }
+def _extend(prim: Usd.Prim, armature: float, damping: float, angle: float | None = None) -> None:
+    """What the schema has no word for, in the words of engines: armature [kg m^2], damping [N m s/rad] beside
+    a servo, and for MuJoCo the angle [rad] at which a hinge starts, without which it would count limits from
+    there."""
+    number = Sdf.ValueTypeNames.Float
+    said = [
+        ("NewtonJointAPI", "newton:armature", number, armature),
+        ("PhysxJointAPI", "physxJoint:armature", number, armature),
+    ]
+    if damping > 0.0:
+        said.append(("NewtonJointAPI", "newton:damping", number, damping * PER_DEGREE))
     if angle is not None:
-        said["MjcJointAPI"] = ("mjc:ref", Sdf.ValueTypeNames.Double, float(np.degrees(angle)))
-    for schema, (name, kind, value) in said.items():
+        said.append(("MjcJointAPI", "mjc:ref", Sdf.ValueTypeNames.Double, float(np.degrees(angle))))
+    for schema in dict.fromkeys(schema for schema, *_ in said):
         prim.AddAppliedSchema(schema)
+    for _, name, kind, value in said:
         prim.CreateAttribute(name, kind, custom=False).Set(value)
 
 

@@ -29,7 +29,10 @@ def add(
             _rigid(prim, model, body)
         colliders[paths[name]] = _colliders(stage, paths[name], [s for s in model.shapes if s.body == body])
     usdjoints.add(stage, base, model, body_q, paths, joints)
-    _filter(stage, colliders)
+    apart = {
+        frozenset(paths[model.body_names[body]] for body in pair) for pair in model.excluded if min(pair) >= 0
+    }
+    _filter(stage, colliders, apart)
 
 
 def add_world(stage: Usd.Stage, model: Model, shapes: list[Shape]) -> None:
@@ -140,11 +143,14 @@ def _material(stage: Usd.Stage, where: str, shape: Shape) -> UsdShade.Material:
     return material
 
 
-def _filter(stage: Usd.Stage, colliders: dict[str, list[tuple[str, Shape]]]) -> None:
+def _filter(
+    stage: Usd.Stage, colliders: dict[str, list[tuple[str, Shape]]], excluded: set[frozenset[str]]
+) -> None:
     """Filtered pairs of what never meets in the model: of bodies where none of their shapes do, else of
     shapes.
 
-    colliders: path and shape of each, by the path of their body. (PhysX, Newton and MuJoCo read filtered
+    colliders: path and shape of each, by the path of their body. excluded: bodies that the file keeps apart,
+    by their paths. (PhysX, Newton and MuJoCo read filtered
     pairs; MuJoCo reads no collision groups.)
     """
     apart: dict[str, list[str]] = {}
@@ -152,7 +158,8 @@ def _filter(stage: Usd.Stage, colliders: dict[str, list[tuple[str, Shape]]]) -> 
     for i, (path_a, shapes_a) in enumerate(bodies):
         for path_b, shapes_b in bodies[i + 1 :]:
             never = [(a, b) for a, x in shapes_a for b, y in shapes_b if not _meet(x, y)]
-            if len(never) == len(shapes_a) * len(shapes_b):
+            all_never = len(never) == len(shapes_a) * len(shapes_b)
+            if all_never or frozenset((path_a, path_b)) in excluded:
                 never = [(path_a, path_b)]
             for a, b in never:
                 apart.setdefault(a, []).append(b)

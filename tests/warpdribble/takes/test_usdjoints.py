@@ -180,3 +180,112 @@ def test_frames_invert():
     frame = usdjoints.Frame(np.array([1.0, 2.0, 3.0]), Rotation.from_rotvec([0.3, 0.2, -0.5]))
     back = frame.inverse() @ frame
     assert np.allclose(back.p, 0.0) and back.R.magnitude() == pytest.approx(0.0, abs=1e-12)
+
+
+SPRUNG = """
+<mujoco><default><joint axis="0 1 0" damping=".4"/><geom size=".1"/></default><worldbody>
+<body name="base" pos="0 0 1"><freejoint name="root"/><geom/>
+<body name="soft"><joint name="soft" stiffness="3" springref="30"/><geom/></body>
+<body name="damped"><joint name="damped"/><geom/></body>
+<body name="open"><joint name="open" stiffness="3"/><geom/></body>
+<body name="capped"><joint name="capped" stiffness="3"/><geom/></body>
+<body name="ball"><joint name="ball" type="ball" stiffness="3"/><geom/></body></body></worldbody><actuator>
+<position joint="open" kp="9" kv="2"/><position joint="capped" kp="9" kv="2" forcerange="-5 5"/></actuator>
+</mujoco>
+"""
+
+
+def sprung_stage(tmp_path, kind, angle=0.5):
+    (tmp_path / "m.xml").write_text(SPRUNG)
+    model = Model.load(tmp_path / "m.xml")
+    q = model.start_q.copy()
+    q[7:11] = angle
+    path = write_take(tmp_path / "m.usdc", Take.of(model, pose.forward(model, q[None]), 10.0), joints=kind)
+    assert validate(path) == []
+    return Usd.Stage.Open(str(path)), model
+
+
+def said(prim, where="angular"):
+    """Torque of a drive at 0.1 rad and 0.2 rad/s, and its limit, from what the file says."""
+    drive = UsdPhysics.DriveAPI(prim, where)
+    target, kp, kd = (
+        a.Get() for a in (drive.GetTargetPositionAttr(), drive.GetStiffnessAttr(), drive.GetDampingAttr())
+    )
+    return kp * (target - np.degrees(0.1)) - kd * np.degrees(0.2), drive.GetMaxForceAttr().Get()
+
+
+def test_springs_and_dampers_are_drives(tmp_path, kind):
+    """The torque that they and the servo make together in the model, limits apart."""
+    stage, _ = sprung_stage(tmp_path, kind)
+    torques = {
+        "soft": 3 * (np.radians(30) - 0.1) - 0.4 * 0.2,
+        "damped": -0.4 * 0.2,
+        "open": 9 * (0.5 - 0.1) + 3 * (0 - 0.1) - 2.4 * 0.2,
+    }
+    for name, torque in torques.items():
+        found, limit = said(stage.GetPrimAtPath(f"{JOINTS}/{name}"))
+        assert found == pytest.approx(torque, rel=1e-5) and np.isinf(limit)
+        assert not stage.GetPrimAtPath(f"{JOINTS}/{name}").HasAttribute("newton:damping")
+    ball = {"d6": ("ball", "rotY"), "revolute": ("ball_y", "angular")}.get(kind)
+    if ball:
+        found, limit = said(stage.GetPrimAtPath(f"{JOINTS}/{ball[0]}"), ball[1])
+        assert found == pytest.approx(3 * (0 - 0.1) - 0.4 * 0.2, rel=1e-5) and np.isinf(limit)
+
+
+def test_a_damper_beside_a_limited_servo_has_a_word_of_its_own(tmp_path, kind):
+    stage, _ = sprung_stage(tmp_path, kind)
+    prim = stage.GetPrimAtPath(f"{JOINTS}/capped")
+    found, limit = said(prim)
+    assert found == pytest.approx(9 * 0.4 - 2 * 0.2, rel=1e-5) and limit == 5.0
+    assert prim.GetAttribute("newton:damping").Get() * 57.29578 == pytest.approx(0.4, rel=1e-6)
+
+
+def test_what_usd_has_no_word_for_is_said(tmp_path, kind, dribble_take, shipped_player):
+    stage, model = sprung_stage(tmp_path, kind)
+    lost = usdjoints.left_out(model, kind)
+    assert lost == [f"spring of {'capped, ball' if kind == 'spherical' else 'capped'}"]
+    assert stage.GetRootLayer().customLayerData["left out"] == lost[0]
+    servos = usdjoints.left_out(shipped_player, kind)
+    assert servos == (["servo of lower_back, torso, neck and 20 others"] if kind == "spherical" else [])
+
+
+def test_damping_of_a_free_body_is_left_out_aloud(tmp_path):
+    (tmp_path / "m.xml").write_text(
+        '<mujoco><worldbody><body><joint name="f" type="free" damping="2" armature="1"/>'
+        '<geom size=".1"/></body></worldbody></mujoco>'
+    )
+    model = Model.load(tmp_path / "m.xml")
+    assert usdjoints.left_out(model, "d6") == ["passive damping of f", "armature of f"]
+
+
+@pytest.mark.parametrize(
+    "limits, degrees, told",
+    [
+        ("0 300", 230, 230),
+        ("0 300", 10, 10),
+        ("-300 0", -250, -250),
+        ("-20 70", 40, 40),
+        ("180 340", 200, 200),
+        ("400 700", 500, 500),
+        ("0 300", 359, -1),  # past its limit by one, not by 59
+        (None, 230, -130),
+    ],
+)
+def test_a_hinge_is_said_within_its_limits(tmp_path, limits, degrees, told):
+    """Poses do not tell whole turns apart: the limits do, in the file's own degrees."""
+    limited = f'limited="true" range="{limits}"' if limits else ""
+    (tmp_path / "m.xml").write_text(
+        f'<mujoco><worldbody><body name="b"><joint name="j" axis="0 .6 -.8" {limited}/><geom size=".1"/>'
+        '</body></worldbody><actuator><position joint="j" kp="9"/></actuator></mujoco>'
+    )
+    model = Model.load(tmp_path / "m.xml")
+    take = Take.of(model, pose.forward(model, np.radians([[float(degrees)]])), 10.0)
+    stage = Usd.Stage.Open(str(write_take(tmp_path / "m.usdc", take)))
+    prim = stage.GetPrimAtPath(f"{JOINTS}/j")
+    target = UsdPhysics.DriveAPI(prim, "angular").GetTargetPositionAttr().Get()
+    assert target == pytest.approx(told, abs=1e-3) and (target - degrees) % 360 == pytest.approx(0, abs=1e-3)
+    assert prim.GetAttribute("mjc:ref").Get() == pytest.approx(told, abs=1e-3)
+    if limits:
+        joint = UsdPhysics.RevoluteJoint(prim)
+        found = (joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get())
+        assert found == pytest.approx([float(number) for number in limits.split()], rel=1e-5)

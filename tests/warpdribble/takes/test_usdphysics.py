@@ -114,6 +114,19 @@ def test_the_player_does_not_meet_itself_but_the_ball_and_the_ground(stage, ship
     assert pairs == {frozenset((a, b)) for a in own for b in own if a < b}
 
 
+def test_bodies_that_a_file_excludes_are_filtered(tmp_path):
+    (tmp_path / "m.xml").write_text(
+        """<mujoco><worldbody><body name="a"><freejoint/><geom size=".1"/></body>
+        <body name="b" pos="1 0 0"><freejoint/><geom size=".1"/></body>
+        <body name="c" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody>
+        <contact><exclude body1="a" body2="c"/></contact></mujoco>"""
+    )
+    model = Model.load(tmp_path / "m.xml")
+    take = Take.of(model, model.zero_pose[None], 10.0)
+    stage = Usd.Stage.Open(str(write_take(tmp_path / "m.usdc", take)))
+    assert filtered(stage) == {frozenset(("a", "c"))}
+
+
 def test_shapes_that_meet_in_part_are_filtered_one_by_one(tmp_path):
     (tmp_path / "m.xml").write_text(
         """<mujoco><worldbody><body name="a"><freejoint name="fa"/><geom type="sphere" size=".1" contype="1"
