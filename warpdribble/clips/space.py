@@ -12,6 +12,7 @@ from ..sims.errors import InputError
 from ..sims.recording import anatomy
 from ..sims.recording.motion import Motion
 from .errors import ClipError
+from .upright import find_up
 
 CMU_UNIT = 2.54 / 100 / 0.45
 """[m] of one length unit of CMU's data: inches, divided by the 0.45 of the ASF header."""
@@ -23,7 +24,8 @@ TO_Z_UP = {
     "y": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "z": np.eye(3),
 }
-"""Up axis of a file -> the cyclic change of axes that makes it Z."""
+TO_Z_UP |= {f"-{axis}": np.diag([1.0, -1.0, -1.0]) @ turn for axis, turn in TO_Z_UP.items()}
+"""Up axis of a file -> the cyclic change of axes that makes it Z; half a turn more where it points down."""
 LARGEST = 1e7
 """No number of a clip is larger, in any unit."""
 
@@ -50,7 +52,7 @@ def into_room(
     unit, its name) that is tried first when none are given. Raises ClipError for what cannot be told.
     """
     scale, said = _unit(path, motion, units, special)
-    axis, told = _up(path, replace(motion, positions=None), up)
+    axis, told = _up(path, motion, up)
     turn = TO_Z_UP[axis]
     yaw = _facing(motion, turn)
     turn = Rotation.from_euler("z", 90.0 * yaw, degrees=True).as_matrix().round() @ turn
@@ -81,7 +83,7 @@ def _unit(
     for joint in range(1, len(reach)):
         reach[joint] = reach[motion.parents[joint]] + np.linalg.norm(motion.offsets[joint])
     longest = reach.max()
-    names = {"m": "metre", "cm": "centimetre", "mm": "millimetre"}
+    names = {"m": "metre", "cm": "centimetre", "mm": "millimetre", "inch": "inch"}
     if special is not None and PERSON[0] < special[0] * longest < PERSON[1]:
         return special[0], f"{special[1]}: one length unit is {special[0]:.6f} m"
     for unit, name in names.items():
@@ -112,24 +114,15 @@ def metres(units: str | float) -> float:
 
 
 def _up(path: Path, motion: Motion, up: str | None) -> tuple[str, str]:
-    """The axis that points up, and how it was told: from the feet to the head over the clip."""
+    """The axis that points up, and how it was told."""
     if up is not None:
-        if up not in TO_Z_UP:
+        if up not in tuple("xyz"):
             raise InputError(f"there is no axis '{up}': it is x, y or z", "", "up")
         return up, f"up axis given: {up.upper()}"
-    found = anatomy.parts(motion.joint_names, motion.parents)
-    feet = [found[part] for part in ("left_ankle", "right_ankle") if part in found]
-    some = np.linspace(0, motion.frame_count - 1, min(motion.frame_count, 60)).astype(int)
-    part = replace(motion, rotations=motion.rotations[some], root_position=motion.root_position[some])
-    places = part.forward()[0]
-    if feet and "head" in found:
-        along = (places[:, found["head"]] - places[:, feet].mean(axis=1)).mean(axis=0)
-    else:
-        along = np.ptp(places, axis=1).mean(axis=0)
-    order = np.argsort(np.abs(along))
-    if along[order[2]] < 1.5 * max(abs(along[order[1]]), 1e-9):
+    told = find_up(motion)
+    if told is None:
         raise ClipError(path, "cannot tell which axis points up: x, y or z", "up")
-    return "xyz"[order[2]], f"{'XYZ'[order[2]]} points up"
+    return told
 
 
 def _facing(motion: Motion, turn: np.ndarray) -> int:
