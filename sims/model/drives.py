@@ -14,6 +14,16 @@ if TYPE_CHECKING:
     import mujoco
 
 
+CAN = {
+    "trn": "joint jointinparent so3",
+    "dyn": "none",
+    "gain": "fixed so3",
+    "bias": "none affine so3",
+}
+"""Kinds of an actuator's parts, as MuJoCo names them."""
+WORDS = {"trn": "transmission", "dyn": "activation", "gain": "gain", "bias": "bias"}
+
+
 class Drives(NamedTuple):
     """What acts on each dof, (nv,) each."""
 
@@ -40,6 +50,8 @@ class Servo(NamedTuple):
 
 def read_drives(m: mujoco.MjModel, t: Tables, path: str | Path) -> Drives:
     """Drives from actuators; efforts go into `t`. Raises ModelError for actuators of other kinds."""
+    import mujoco
+
     kp, kd = np.zeros(m.nv), np.zeros(m.nv)
     damping, armature = m.dof_damping.copy(), m.dof_armature.copy()
     effort = np.full(m.nv, ANYWHERE)
@@ -51,10 +63,10 @@ def read_drives(m: mujoco.MjModel, t: Tables, path: str | Path) -> Drives:
     for a in range(m.nactuator):
         name = m.actuator(a).name or str(a)
         what = f"{path}: actuator '{name}'"
-        if int(m.actuator_trntype[a]) not in (0, 1, 6) or int(m.actuator_dyntype[a]) != 0:
-            raise ModelError(f"{what} is not supported; use position actuators")
+        _check_kinds(m, a, what)
         j, gear = int(m.actuator_trnid[a, 0]), m.actuator_gear[m.actuator_outadr[a]]
-        if int(m.actuator_trntype[a]) != 6:  # MuJoCo takes the first gear for all dofs of the joint
+        # MuJoCo takes the first gear for all dofs of the joint, and none where a servo turns it whole
+        if m.actuator_trntype[a] != mujoco.mjtTrn.mjTRN_SO3:
             dofs = _dofs(m, j)
             damping[dofs] += m.actuator_damping[a] * gear[0] ** 2
             armature[dofs] += m.actuator_armature[a] * gear[0] ** 2
@@ -80,6 +92,19 @@ def read_drives(m: mujoco.MjModel, t: Tables, path: str | Path) -> Drives:
     return Drives(kp, kd, damping, armature, notes)
 
 
+def _check_kinds(m: mujoco.MjModel, a: int, what: str) -> None:
+    """Raise ModelError for an actuator with a part of a kind that is not in `CAN`."""
+    import mujoco
+
+    for field, may in CAN.items():
+        kinds = getattr(mujoco, f"mjt{field.capitalize()}")
+        kind = kinds(int(getattr(m, f"actuator_{field}type")[a])).name.partition("_")[2].lower()
+        if kind not in may.split():
+            raise ModelError(f"{what}: {WORDS[field]} {kind} is not supported; use position actuators")
+    if m.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_SO3 and m.actuator_trnid[a, 1] >= 0:
+        raise ModelError(f"{what}: transmission site is not supported; turn a ball joint")
+
+
 def _dofs(m: mujoco.MjModel, j: int) -> slice:
     first = int(m.jnt_dofadr[j])
     return slice(first, first + DOF_SIZE[JOINTS[int(m.jnt_type[j])]])
@@ -94,12 +119,16 @@ def _servo(m: mujoco.MjModel, a: int, j: int, gear: np.ndarray, what: str) -> Se
     turns = both == (mujoco.mjtGain.mjGAIN_SO3, mujoco.mjtBias.mjBIAS_SO3)
     gain, bias = m.actuator_gainprm[a], m.actuator_biasprm[a]
     if not (turns or both == (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE)):
-        raise ModelError(f"{what} is not supported; use position actuators")
+        raise ModelError(f"{what}: its gain and bias are of two kinds; use position actuators")
     if gain[0] <= 0 or not np.isclose(gain[0], -bias[1]) or bias[0] != 0 or bias[2] > 0:
         raise ModelError(f"{what} is not a position servo (kp, kv)")
     clamped = not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
-    if clamped and m.actuator_ctrllimited[m.actuator_ctrladr[a]]:
-        raise ModelError(f"{what}: ctrlrange is not supported; limit the joint, and keep targets inside")
+    ctrl = int(m.actuator_ctrladr[a])
+    if clamped and m.actuator_ctrllimited[ctrl]:
+        low, high = m.actuator_ctrlrange[ctrl]
+        raise ModelError(
+            f"{what}: ctrlrange {low:g} {high:g} is not supported, targets are not clamped; limit the joint"
+        )
     dofs, effort = _dofs(m, j), ANYWHERE
     low, high = m.actuator_forcerange[a]
     if turns:

@@ -207,9 +207,9 @@ MUST_BE_DEFAULT = {
     "actuator_dampingpoly": Default("damping of second and third order", "give damping one number"),
     "eq_active0": Default("", "remove it, or say active='false'"),
     **{
-        f"tendon_{field}": Default(f"tendon {word}", "a tendon may only be measured: use joints' own")
+        f"tendon_{field}": Default(word, "a tendon may only be measured: use joints' own")
         for field, word in {
-            "limited": "range",
+            "limited": "limited",
             "stiffness": "stiffness",
             "stiffnesspoly": "stiffness",
             "damping": "damping",

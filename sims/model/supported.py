@@ -185,6 +185,9 @@ def _notes(m: mujoco.MjModel) -> list[str]:
     notes = []
     if m.neq:
         notes.append(f"{m.neq} equality constraint(s) that are not active are left out")
+    moving = [m.key(k).name or str(k) for k in range(m.nkey) if m.key_qvel[k].any()]
+    if moving:
+        notes.append(f"velocities of keyframes are left out: {', '.join(moving)}")
     new = sorted(unknown(m))
     if new:
         notes.append(

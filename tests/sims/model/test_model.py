@@ -86,6 +86,17 @@ REFUSED = {
         actuator('<general name="a" joint="j" gaintype="affine" gainprm="1 1 0"/>'),
         "actuator 'a'",
     ),
+    "filtered servo": (
+        actuator('<position name="a" joint="j" kp="1" timeconst="0.1"/>'),
+        "actuator 'a': activation filterexact",
+    ),
+    "orientation of a site": (
+        mjcf(
+            BODY.replace("</body>", '<site name="s"/></body>') + '<site name="w"/>',
+            rest='<actuator><orientation name="a" site="s" refsite="w" kp="1"/></actuator>',
+        ),
+        "actuator 'a': transmission site",
+    ),
     "pid": (actuator('<pid name="a" joint="j" kp="1" ki="1"/>'), "actuator 'a'"),
     "gear askew": (
         actuator('<position name="a" joint="j" kp="1" gear="1 1 0"/>', "ball"),
