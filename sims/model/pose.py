@@ -92,20 +92,28 @@ class Limb:
     axis: np.ndarray
     """(3,), the hinge's axis; it bends the limb at positive angles."""
 
+    def length(self, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance (n,) [m] from the ball joint to the end joint at hinge angles (n,) [rad], and its slope
+        (n,) [m/rad]; the other way round than `bend_for`."""
+        a, b, c = self._cosine()
+        far = np.sqrt(2.0 * (a * np.cos(angle) + b * np.sin(angle) + c))
+        return far, (b * np.cos(angle) - a * np.sin(angle)) / far
+
     def bend_for(self, distance: np.ndarray) -> np.ndarray:
         """Hinge angle (n,) [rad] at which the end is `distance` (n,) [m] from the ball joint;
-        clipped to reach.
-
-        |upper + R(axis, t) lower|^2 = distance^2 is A cos t + B sin t + C = const.
-        """
-        along = self.axis * (self.axis @ self.lower)
-        a = self.upper @ (self.lower - along)
-        b = self.upper @ np.cross(self.axis, self.lower)
-        c = self.upper @ along
-        sum_of_squares = self.upper @ self.upper + self.lower @ self.lower
-        wanted = 0.5 * (np.asarray(distance) ** 2 - sum_of_squares) - c
+        clipped to reach."""
+        a, b, c = self._cosine()
+        wanted = 0.5 * np.asarray(distance) ** 2 - c
         reach = np.hypot(a, b)
         return np.arctan2(b, a) + np.arccos(np.clip(wanted / reach, -1.0, 1.0))
+
+    def _cosine(self) -> tuple[float, float, float]:
+        """A, B and C [m^2] of 0.5 |upper + R(axis, t) lower|^2 = A cos t + B sin t + C."""
+        along = self.axis * (self.axis @ self.lower)
+        squares = self.upper @ self.upper + self.lower @ self.lower
+        a = self.upper @ (self.lower - along)
+        b = self.upper @ np.cross(self.axis, self.lower)
+        return float(a), float(b), float(0.5 * squares + self.upper @ along)
 
     def solve(self, start: np.ndarray, end: np.ndarray, hinge: np.ndarray) -> tuple[Rotation, np.ndarray]:
         """World rotation (n,) of the upper segment and hinge angle (n,) [rad] that put the end
@@ -121,6 +129,13 @@ class Limb:
         return frame_of(reach, hinge) * own.inv(), angle
 
 
+def limb(model: Model, hinge: str) -> Limb:
+    """The limb that a hinge bends. Raises ValueError for a hinge that bends none."""
+    upper, lower, last = limb_bodies(model, hinge)
+    zero = model.zero_pose[:, :3]
+    return Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
+
+
 def place_limb(
     model: Model, joint_q: np.ndarray, hinge: str, end: ArrayLike, end_turn: Rotation, axis: ArrayLike
 ) -> None:
@@ -129,14 +144,13 @@ def place_limb(
     The body at the limb's far end gets its origin to `end` (3,) or (frames, 3) [m] and the world
     rotation `end_turn`; the hinge's axis points toward `axis` (3,) or (frames, 3) in the world.
     """
-    upper, lower, last = limb_bodies(model, hinge)
+    upper, _, last = limb_bodies(model, hinge)
     above = int(model.body_parent[upper])
-    zero = model.zero_pose[:, :3]
-    limb = Limb(zero[lower] - zero[upper], zero[last] - zero[lower], model.joint_axis(hinge))
+    own = limb(model, hinge)
     now = forward(model, joint_q, (upper, above))
     frames = len(joint_q)
     end, axis = (np.array(np.broadcast_to(v, (frames, 3))) for v in (end, axis))
-    turn, angle = limb.solve(now[:, upper, :3], end, axis)
+    turn, angle = own.solve(now[:, upper, :3], end, axis)
     parent = Rotation.from_quat(now[:, above, 3:]) if above >= 0 else Rotation.identity()
     joint_q[:, model.q_slice(model.body_joint(upper))] = (parent.inv() * turn).as_quat()
     joint_q[:, model.q_slice(hinge)] = angle[:, None]

@@ -10,12 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from ..model import Model, gaps, pose
 from .mapping import Mapping
-from .planting import Foot, find_foot
 from .reach import joint_range
 from .retarget import Retargeted
+from .sole import Foot, find_foot
 
 ON_GROUND = 0.005
 """[m] A point of the sole this low carries."""
+MOVING = 0.3
+"""[m/s] What is that low and faster than this skims the ground."""
 LIMBS = ("trunk", "hips", "knees", "feet", "shoulders", "elbows", "hands")
 
 
@@ -43,6 +45,8 @@ class Accuracy:
     """Deepest that any point of the whole body is under the ground."""
     off_ground: float
     """Mean height of a standing foot's lowest point: feet that are said to stand and do not."""
+    skimming: float
+    """Share of frames in which a foot is on the ground and all of it that is moves, standing or not."""
     standing: float
     """Share of frames with a foot on the ground."""
     limits: float
@@ -70,11 +74,12 @@ def accuracy(model: Model, result: Retargeted) -> Accuracy:
         if apart:
             limbs[limb] = (float(np.mean(apart)), float(np.quantile(apart, 0.95)))
     slides, strict, lows = [], [], []
-    deepest, stood = 0.0, np.zeros(len(joint_q), bool)
+    deepest, stood, skims = 0.0, np.zeros(len(joint_q), bool), np.zeros(len(joint_q), bool)
     for name, stands in result.stands.items():
         foot = find_foot(model, name)
         points = sole_points(foot, body_q)
         deepest = max(deepest, -float(points[..., 2].min()))
+        skims |= skimming(points[:, :-1], model.timestep)
         for stand in stands:
             part = points[stand.first : stand.last + 1]
             stood[stand.first : stand.last + 1] = True
@@ -98,6 +103,7 @@ def accuracy(model: Model, result: Retargeted) -> Accuracy:
         penetration=deepest,
         body_penetration=max(0.0, -float(gaps.lowest_point(model, body_q, own).min())),
         off_ground=float(np.concatenate(lows).mean()) if lows else 0.0,
+        skimming=float(skims.mean()),
         standing=float(stood.mean()),
         limits=beyond_limits(model, joint_q),
     )
@@ -122,6 +128,16 @@ def sole_points(foot: Foot, body_q: np.ndarray) -> np.ndarray:
     down = np.array([0.0, 0.0, foot.drop])
     points += [body_q[:, foot.toes, :3] + turn.apply(tip) - down for tip in (*foot.tips, np.zeros(3))]
     return np.stack(points, axis=1)
+
+
+def skimming(points: np.ndarray, timestep: float) -> np.ndarray:
+    """Rows (frames,) bool in which points (frames, n, 3) [m] of a sole are on the ground and none of those is
+    at rest."""
+    if len(points) < 2:
+        return np.zeros(len(points), bool)
+    speed = np.linalg.norm(np.gradient(points[..., :2], timestep, axis=0), axis=2)
+    slowest = np.where(points[..., 2] < ON_GROUND, speed, np.inf).min(axis=1)
+    return np.isfinite(slowest) & (slowest > MOVING)
 
 
 def beyond_limits(model: Model, joint_q: np.ndarray) -> float:

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ..model import Model, gaps, pose
 from ..model.joints import Joint
+from ..signals import smoothstep
 
 STRETCH = 0.998
 """Of a leg's length that it is stretched to at most; a straight knee jerks."""
@@ -16,6 +17,8 @@ SHRUG = 0.25
 """[rad] by which a clavicle is turned at most for a shoulder to come nearer to its goal."""
 STRAIGHT = 0.02
 """[m] An elbow nearer to the line from shoulder to wrist does not say where it points."""
+BEYOND = 0.5
+"""[rad] A hand or foot that would have to turn this far beyond its range keeps the angles it has."""
 SUNK = 0.001
 """[m] A foot or hand deeper than this in the ground is lifted out."""
 LARGEST = 0.12
@@ -35,14 +38,15 @@ def reach(
     upper, lower, last = pose.limb_bodies(model, hinge)
     if axis is None:
         axis = _turn(model, joint_q, lower).apply(model.joint_axis(hinge))
+    wrist = model.q_slice(model.body_joint(last))
+    before = Rotation.from_quat(joint_q[:, wrist])
     pose.place_limb(model, joint_q, hinge, end, turn, axis)
-    for joint in (model.body_joint(upper), hinge, model.body_joint(last)):
+    for joint in (model.body_joint(upper), hinge):
         keep_range(model, joint_q, joint)
     # a hinge or ball stopped by its range leaves the far body turned: its own joint makes up for it
-    beyond = _turn(model, joint_q, lower)
-    wrist = model.body_joint(last)
-    joint_q[:, model.q_slice(wrist)] = (beyond.inv() * turn).as_quat()
-    keep_range(model, joint_q, wrist)
+    wanted = _turn(model, joint_q, lower).inv() * turn
+    largest = joint_range(model.joints[model.joint(model.body_joint(last))])[1]
+    joint_q[:, wrist] = brought_within(wanted, largest, before).as_quat()
 
 
 def lift_out(
@@ -133,6 +137,15 @@ def keep_range(model: Model, joint_q: np.ndarray, joint: str) -> None:
         joint_q[:, own.q] = np.clip(joint_q[:, own.q], low, high)
     elif own.kind == "ball":
         joint_q[:, own.q] = within(Rotation.from_quat(joint_q[:, own.q]), high).as_quat()
+
+
+def brought_within(turn: Rotation, largest: float, instead: Rotation) -> Rotation:
+    """Rotations cut back along their axis to an angle of `largest` [rad]; those far beyond become `instead`,
+    as at half a turn the axis turns round and what is cut back jumps to the range's other side."""
+    share = smoothstep(np.clip((turn.magnitude() - largest) / BEYOND, 0.0, 1.0))[:, None]
+    # with w >= 0, quaternions within an angle are a cone: what lies between two of them is within it too
+    cut, instead = within(turn, largest), instead.as_quat(canonical=True)
+    return Rotation.from_quat((1.0 - share) * cut.as_quat(canonical=True) + share * instead)
 
 
 def within(turn: Rotation, largest: float) -> Rotation:

@@ -13,21 +13,29 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter, minimum_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..model import Model, pose
+from ..recording import anatomy
 from ..recording.motion import Motion
 from ..reference.reference import Reference
-from ..signals import low_pass_rotations
+from ..signals import low_pass, low_pass_rotations
 from .calibrate import match_limbs, since_rest
+from .knees import Leg, ease_knees
 from .mapping import Mapping, find_mapping
-from .planting import Foot, Stand, find_foot, find_stands, planted, sole_heights
-from .reach import elbow_axis, keep_range, lift_out, lower_root, reach, shrug
+from .planting import Stand, Tread, find_stands, standing
+from .reach import brought_within, elbow_axis, joint_range, keep_range, lift_out, lower_root, reach, shrug
+from .sole import Foot, find_foot, sole_heights
+from .swings import swinging
 from .tpose import t_pose
 
 GROUND = (1.6, 0.3)
 """[s] The ground is the lowest that the soles come within the first time, smoothed over the second."""
+STIFF = np.radians(1.0)
+"""A standing foot that its ankle turns by more than this lifts its heel."""
+TOES = 6.0
+"""[Hz] Toes bend no faster."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +50,12 @@ class Retargeted:
     """Body -> (frames, 3) [m], where the recording has its origin, scaled, over ground at z = 0."""
     ground: np.ndarray
     """(frames,) [m] height of the ground in the scaled recording, taken off."""
+    toes: dict[str, str | None] = field(default_factory=dict)
+    """Foot -> joint of the recording that its toes follow; None where it has none, and toes are straight."""
     stands: dict[str, list[Stand]] = field(default_factory=dict)
     """Foot -> its stands."""
-    lowered: np.ndarray | None = None
-    """(frames,) [m] by which the root went down for the legs to reach."""
+    moved: np.ndarray | None = None
+    """(frames, 3) [m] by which the root gave way for the legs to reach, and to do so without jerks."""
     notes: tuple[str, ...] = ()
     """What was guessed or put right of the recording's T-pose."""
 
@@ -59,8 +69,8 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
     """The motion on the model, resampled to a whole number of its steps, the ground at z = 0.
 
     mapping: None takes the shipped one that fits. ik: False copies rotations only. Bodies the mapping does
-    not name keep the angles of the model's start pose (fingers, the ball). Raises MappingError (a
-    ValueError) for a joint or body that is not there.
+    not name keep the angles of the model's start pose (fingers, the ball); only toes are looked for by name.
+    Raises MappingError (a ValueError) for a joint or body that is not there.
     """
     mapping = mapping or find_mapping(motion)
     mapping.check_model(model)
@@ -71,17 +81,29 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
     scale = leg_scale(model, motion, mapping)
     goals = {b: scale * positions[:, motion.index(j)] for b, j in goal_joints(model, mapping).items()}
 
-    turned = _body_rotations(model, motion, positions, since_rest(motion, frames), mapping)
+    since = since_rest(motion, frames)
+    turned = _body_rotations(model, motion, positions, since, mapping)
     joint_q = np.tile(np.asarray(model.start_q, dtype=float), (motion.frame_count, 1))
+    root = model.body_names[model.joint_body(model.root)]
+    if root in mapping.smoothed:
+        soft = low_pass_rotations(turned[root].as_quat(), motion.rate, mapping.smoothed[root])
+        turned[root] = Rotation.from_quat(soft)
     joint_q[:, model.q_slice(model.root)] = _root(model, goals, mapping, turned)
-    _fill_joints(model, joint_q, turned)
+    _fill_joints(model, joint_q, turned, mapping.smoothed)
     knees = {model.body_names[pose.limb_bodies(model, knee)[2]]: knee for knee in mapping.legs}
-    feet = {name: find_foot(model, name) for name in knees}
-    ground = _ground(model, joint_q, goals, feet)
+    toes = {name: _toe_joint(model, motion, mapping, name) for name in knees}
+    treads = _treads(model, motion, scale * positions, since, joint_q, goals, toes)
+    for name, tread in treads.items():
+        joint = find_foot(model, name).toe_joint
+        joint_q[:, model.q_slice(joint)] = tread.toes[:, None]
+        keep_range(model, joint_q, joint)
+    ground = _ground(model, treads)
+    treads = {name: tread.above(ground) for name, tread in treads.items()}
     joint_q[:, model.q_slice(model.root).start + 2] -= ground
     goals = {body: goal - ground[:, None] * [0.0, 0.0, 1.0] for body, goal in goals.items()}
-    out = Retargeted(Reference(joint_q, model.timestep), mapping, scale, goals, ground, notes=notes)
-    return _with_ik(model, out, feet, knees) if ik else out
+    reference = Reference(joint_q, model.timestep)
+    out = Retargeted(reference, mapping, scale, goals, ground, toes, notes=notes)
+    return _with_ik(model, out, treads, knees) if ik else out
 
 
 def goal_joints(model: Model, mapping: Mapping) -> dict[str, str]:
@@ -104,19 +126,18 @@ def leg_scale(model: Model, motion: Motion, mapping: Mapping) -> float:
     return own / theirs
 
 
-def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[str, str]) -> Retargeted:
-    """The motion with feet planted and hands brought to their goals. feet, knees: of each leg by the foot's
+def _with_ik(model: Model, out: Retargeted, treads: dict[str, Tread], knees: dict[str, str]) -> Retargeted:
+    """The motion with feet planted and hands brought to their goals. treads, knees: of each leg by the foot's
     name."""
     joint_q = out.reference.joint_q
-    body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
-    stands, paths = {}, {}
-    for name, foot in feet.items():
-        turn = Rotation.from_quat(body_q[:, foot.body, 3:])
-        stands[name] = find_stands(foot, out.goals[name], turn, model.timestep)
-        paths[name] = planted(foot, out.goals[name], turn, stands[name])
-    lowered = lower_root(model, joint_q, {knees[name]: paths[name][0] for name in feet})
-    for name, foot in feet.items():
-        _place_foot(model, joint_q, foot, knees[name], *paths[name])
+    copied = joint_q.copy()
+    stands = {name: find_stands(find_foot(model, name), t, model.timestep) for name, t in treads.items()}
+    moved, stiff = _plant(model, joint_q, treads, stands, knees)
+    if any(angle.max() > STIFF for angle in stiff.values()):
+        # where an ankle does not bend as far as a flat foot needs, the heel is up
+        stands = {name: [s.raised(stiff[name], model.timestep) for s in stands[name]] for name in stands}
+        joint_q[:] = copied
+        moved, _ = _plant(model, joint_q, treads, stands, knees)
     hands = [pose.limb_bodies(model, elbow)[2] for elbow in out.mapping.arms]
     body_q = pose.forward(model, joint_q, hands)
     for elbow in out.mapping.arms:
@@ -127,7 +148,28 @@ def _with_ik(model: Model, out: Retargeted, feet: dict[str, Foot], knees: dict[s
         turn = Rotation.from_quat(body_q[:, hand, 3:])
         reach(model, joint_q, elbow, places[2], turn, axis)
         lift_out(model, joint_q, elbow, places[2], model.descendants(hand))
-    return replace(out, stands=stands, lowered=lowered)
+    return replace(out, stands=stands, moved=moved)
+
+
+def _plant(
+    model: Model,
+    joint_q: np.ndarray,
+    treads: dict[str, Tread],
+    stands: dict[str, list[Stand]],
+    knees: dict[str, str],
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Bring both legs of joint_q, in place, to feet that stand where they stand. Returns the root's way
+    (frames, 3) [m], and by how much (frames,) [rad] each foot is turned from what it should be."""
+    paths, legs, stiff = {}, [], {}
+    for name, tread in treads.items():
+        ankle, *paths[name] = swinging(find_foot(model, name), tread, stands[name], model.timestep)
+        legs.append(Leg(knees[name], ankle, standing(stands[name], len(ankle))))
+    moved, ankles = ease_knees(model, joint_q, legs)
+    moved[:, 2] -= lower_root(model, joint_q, {leg.hinge: ankle for leg, ankle in zip(legs, ankles)})
+    for name, ankle in zip(treads, ankles):
+        foot = find_foot(model, name)
+        stiff[name] = _place_foot(model, joint_q, foot, knees[name], ankle, *paths[name])
+    return moved, stiff
 
 
 def _place_foot(
@@ -138,29 +180,68 @@ def _place_foot(
     place: np.ndarray,
     turn: Rotation,
     toes: np.ndarray,
-) -> None:
+) -> np.ndarray:
     """Bring a leg to its foot's path, in place; a foot that the ankle's range turns into the ground goes
-    that much higher."""
+    that much higher. Returns by how much (frames,) [rad] that range turns it."""
     joint_q[:, model.q_slice(foot.toe_joint)] = toes[:, None]
     keep_range(model, joint_q, foot.toe_joint)
     reach(model, joint_q, knee, place, turn)
+    now = Rotation.from_quat(pose.forward(model, joint_q, [foot.body])[:, foot.body, 3:])
     lift_out(model, joint_q, knee, place, [foot.body, foot.toes])
+    return np.asarray((now.inv() * turn).magnitude())
 
 
-def _ground(
-    model: Model, joint_q: np.ndarray, goals: dict[str, np.ndarray], feet: dict[str, Foot]
-) -> np.ndarray:
+def _ground(model: Model, treads: dict[str, Tread]) -> np.ndarray:
     """Height (frames,) [m] of the ground under the recording: constant where the clip is short, else
     following what the soles come down to, of our feet on the recording's ankles."""
-    body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
-    heights = []
-    for name, foot in feet.items():
-        turn = Rotation.from_quat(body_q[:, foot.body, 3:])
-        heights.append(sole_heights(foot, goals[name], turn).min(axis=1))
+    heights = [
+        sole_heights(find_foot(model, name), t.ankle, t.turn).min(axis=1) for name, t in treads.items()
+    ]
     low = gaussian_filter1d(np.min(heights, axis=0), 0.03 / model.timestep, mode="nearest")
     rows = round(GROUND[0] / model.timestep)
     ground = minimum_filter1d(low, min(rows, len(low)), mode="nearest")
     return gaussian_filter1d(ground, GROUND[1] / model.timestep, mode="nearest")
+
+
+def _toe_joint(model: Model, motion: Motion, mapping: Mapping, foot: str) -> str | None:
+    """The recording's joint for a foot's toes: the mapping's, else a child of the foot's joint that is called
+    one; None when there is none."""
+    toes = model.body_names[find_foot(model, foot).toes]
+    if toes in mapping.bodies or foot not in mapping.bodies:
+        return mapping.bodies.get(toes)
+    found = anatomy.parts(motion.joint_names, motion.parents)
+    ankle = motion.index(mapping.bodies[foot])
+    own = [joint for part, joint in found.items() if part.endswith("_toe") and motion.parents[joint] == ankle]
+    return motion.joint_names[own[0]] if own else None
+
+
+def _treads(
+    model: Model,
+    motion: Motion,
+    positions: np.ndarray,
+    since: Callable[[str], Rotation],
+    joint_q: np.ndarray,
+    goals: dict[str, np.ndarray],
+    toes: dict[str, str | None],
+) -> dict[str, Tread]:
+    """Foot -> how it was recorded, levelled. positions: (frames, joints, 3) [m], scaled; joint_q: with copied
+    rotations; toes: foot -> joint of the recording."""
+    feet = {name: find_foot(model, name) for name in toes}
+    body_q = pose.forward(model, joint_q, [foot.body for foot in feet.values()])
+    treads = {}
+    for name, foot in feet.items():
+        turn = Rotation.from_quat(body_q[:, foot.body, 3:])
+        ball = goals[name][:, 2] + turn.apply(foot.ball)[:, 2]
+        bent = np.zeros(len(joint_q))
+        toe = toes[name]
+        if toe is not None:
+            parent = motion.joint_names[motion.parents[motion.index(toe)]]
+            ball = positions[:, motion.index(toe), 2]
+            bent = pose.twist(since(parent).inv() * since(toe), model.joint_axis(foot.toe_joint))
+            # single frames jump in almost every recording
+            bent = low_pass(median_filter(bent, 5, mode="nearest"), 1.0 / model.timestep, TOES)
+        treads[name] = Tread(goals[name], turn, ball, bent).levelled(foot, model.timestep)
+    return treads
 
 
 def _body_rotations(
@@ -178,9 +259,6 @@ def _body_rotations(
         turned[body] = since(joint) * match.get(body, Rotation.identity())
         if body in mapping.palms:
             turned[body] = _palm(model, body, [positions[:, motion.index(j)] for j in mapping.palms[body]])
-        if body in mapping.smoothed:
-            soft = low_pass_rotations(turned[body].as_quat(), motion.rate, mapping.smoothed[body])
-            turned[body] = Rotation.from_quat(soft)
     return turned
 
 
@@ -193,9 +271,11 @@ def _palm(model: Model, hand: str, places: list[np.ndarray]) -> Rotation:
     return now * pose.frame_of(own[2] - own[0], own[1] - own[3]).inv()
 
 
-def _fill_joints(model: Model, joint_q: np.ndarray, turned: dict[str, Rotation]) -> None:
+def _fill_joints(
+    model: Model, joint_q: np.ndarray, turned: dict[str, Rotation], smoothed: dict[str, float]
+) -> None:
     """Joint coordinates of the bodies in `turned`, in place; hinges take the angle nearest to the copied
-    rotation, all stay within their range.
+    rotation, all stay within their range. smoothed: body -> [Hz], low-passed after that.
 
     A joint's own rotation is what brings its body, now at the zero angle, to the wanted world rotation.
     """
@@ -212,7 +292,18 @@ def _fill_joints(model: Model, joint_q: np.ndarray, turned: dict[str, Rotation])
             joint_q[:, q] = wanted.as_quat()
         else:
             joint_q[:, q] += pose.twist(wanted, model.joint_axis(joint))[:, None]
+        if name in smoothed and model.joint_type(joint) == "ball":
+            # what is far beyond a joint's range is no rotation of that joint
+            high = joint_range(model.joints[model.joint(joint)])[1]
+            wanted = brought_within(wanted, high, Rotation.identity(len(joint_q)))
+            joint_q[:, q] = wanted.as_quat(canonical=True)
         keep_range(model, joint_q, joint)
+        if name in smoothed:
+            # within its range, and with w >= 0, no quaternion of a ball joint is near another's opposite
+            joint_q[:, q] = low_pass(joint_q[:, q], 1.0 / model.timestep, smoothed[name])
+            if model.joint_type(joint) == "ball":
+                joint_q[:, q] /= np.linalg.norm(joint_q[:, q], axis=1, keepdims=True)
+            keep_range(model, joint_q, joint)
 
 
 def _root(

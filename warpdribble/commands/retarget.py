@@ -42,6 +42,7 @@ class Retarget(ClipInput):
         for note in (*notes, *result.notes):
             say(f"            {note}")
         say(f"onto        {model.name} with the mapping {mapping.name}, lengths times {result.scale:.3f}")
+        say(f"toes        {_toes(result.toes)}")
         for line in _table(accuracy(model, result)):
             say(line)
         if "ball" in model.body_names:
@@ -100,11 +101,19 @@ def _table(fit: Accuracy) -> list[str]:
         lines.append(f"  {limb:10}{100 * mean:5.1f} {100 * most:5.1f} cm")
     lines.append(
         f"feet        on the ground {100 * fit.standing:.0f} % of the time, "
-        f"sliding {1e3 * fit.sliding:.1f} mm/s (99 %: {1e3 * fit.sliding_worst:.0f})"
+        f"sliding {1e3 * fit.sliding:.1f} mm/s (99 %: {1e3 * fit.sliding_worst:.0f}); "
+        f"skimming it {100 * fit.skimming:.0f} % of the time"
     )
     deepest = max(fit.penetration, fit.body_penetration)
     lines.append(f"ground      deepest point {1e3 * deepest:.1f} mm under it")
     return lines
+
+
+def _toes(found: dict[str, str | None]) -> str:
+    """Whose angles the toes have."""
+    lines = [f"{foot} follow {joint}" if joint else f"{foot} straight between steps: no toe was recorded"
+             for foot, joint in found.items()]  # fmt: skip
+    return ", ".join(line.replace("foot", "toes", 1) for line in lines)
 
 
 def _ball(name: str, ball: Ball, timestep: float) -> list[str]:
