@@ -116,13 +116,13 @@ def goal_joints(model: Model, mapping: Mapping) -> dict[str, str]:
 
 def leg_scale(model: Model, motion: Motion, mapping: Mapping) -> float:
     """[-] length of the model's legs over the recorded person's."""
-    zero = model.zero_pose[:, :3]
     own = theirs = 0.0
+    zero, rest = model.zero_pose[:, :3], motion.rest()[0]
     for knee, joints in mapping.legs.items():
-        bodies = pose.limb_bodies(model, knee)
-        for (a, b), joint in zip(pairwise(bodies), joints[1:]):
+        for a, b in pairwise(pose.limb_bodies(model, knee)):
             own += float(np.linalg.norm(zero[b] - zero[a]))
-            theirs += float(np.linalg.norm(motion.offsets[motion.index(joint)]))
+        for a, b in pairwise(map(motion.index, joints)):
+            theirs += float(np.linalg.norm(rest[b] - rest[a]))
     return own / theirs
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from warpdribble.sims.model import pose
+from warpdribble.sims.recording.motion import Motion
 
 SIDES = (("Left", 1.0), ("Right", -1.0))
 
@@ -36,6 +37,11 @@ def zero_at(motion, **bent):
         turn = Rotation.from_rotvec(bent.get(name, np.zeros(3)), degrees=True)
         world.append(turn * world[above] if above >= 0 else turn)
     return redrawn(motion, [turn.inv() for turn in world])
+
+
+def at_its_rest(motion):
+    """The motion redrawn so that its rest pose is where all angles are zero."""
+    return redrawn(motion, list(Rotation.from_quat(motion.rest()[1]).inv()))
 
 
 def in_a_line(motion, right=1.0, twist=None, by=None):
@@ -107,6 +113,34 @@ def without(motion, words):
     """The motion without the joints at ends whose names hold one of `words`."""
     order = [j for j, name in enumerate(motion.joint_names) if not any(word in name for word in words)]
     return _taken(motion, order)
+
+
+def split(motion, joint):
+    """The motion with one joint more in the middle of the bone that leads to `joint`: a roll bone."""
+    number, count = motion.joint_names.index(joint), len(motion.parents)
+    half = motion.offsets[number] / 2.0
+    more = with_more(motion, {f"{joint}Roll": (motion.joint_names[motion.parents[number]], half)})
+    parents, offsets = more.parents.copy(), more.offsets.copy()
+    parents[number], offsets[number] = count, half
+    order = [*range(number), count, *range(number, count)]
+    names = tuple(more.joint_names[j] for j in order)
+    parents = np.array([order.index(p) if p >= 0 else -1 for p in parents[order]])
+    turns, rest = more.rotations[:, order], more.rest_rotations[order]
+    return Motion(names, parents, offsets[order], turns, motion.root_position, motion.rate, rest)
+
+
+def on_a_carrier(motion):
+    """The motion below a root that stays where it is, as MotionBuilder's Reference does."""
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (motion.frame_count + 1, 1, 1))
+    return Motion(
+        joint_names=("Reference", *motion.joint_names),
+        parents=np.array([-1, *(motion.parents + 1)]),
+        offsets=np.array([np.zeros(3), motion.root_position[0], *motion.offsets[1:]]),
+        rotations=np.concatenate([still[1:], motion.rotations], axis=1),
+        root_position=np.zeros((motion.frame_count, 3)),
+        rate=motion.rate,
+        rest_rotations=np.concatenate([still[0], motion.rest_rotations]),
+    )
 
 
 def fingers():

@@ -9,18 +9,22 @@ from scipy.spatial.transform import Rotation
 
 from tests.sims.retarget.person import about, person
 from tests.sims.retarget.rigs import (
+    at_its_rest,
     fingers,
     in_a_line,
+    on_a_carrier,
     redrawn,
     reordered,
     scaled,
+    split,
     with_more,
     without,
     zero_at,
 )
+from warpdribble.clips import read_clip
 from warpdribble.sims import Model
 from warpdribble.sims.model import pose
-from warpdribble.sims.retarget.mapping import MappingError, read_mapping
+from warpdribble.sims.retarget.mapping import MappingError, find_mapping, read_mapping
 from warpdribble.sims.retarget.retarget import retarget, retargeted
 
 
@@ -129,6 +133,17 @@ def test_toes_are_found_behind_any_number_of_joints(player, walk):
             )
 
 
+@pytest.mark.parametrize("drawn", ["A", "in a line", "right side mirrored"])
+def test_roll_bones_and_a_root_that_carries_the_person_change_nothing(player, walk, drawn):
+    draw, rolled = (DRAWN | LINES)[drawn], on_a_carrier(walk)
+    for side in ("Left", "Right"):
+        for joint in ("Leg", "Foot", "ForeArm", "FingerBase"):
+            rolled = split(rolled, side + joint)
+    result = retargeted(player, draw(rolled))
+    assert result.scale == pytest.approx(1.0)
+    assert apart(player, result, retargeted(player, draw(walk)))[1] < 0.002
+
+
 def test_feet_without_toes_and_hands_without_fingers(player, walk):
     """Less is known of them, and they still go where they went."""
     bare = without(in_a_line(walk), ("Toe", "Hand", "_end"))
@@ -148,6 +163,18 @@ def test_the_pose_of_the_clip_does_not_matter(player, walk):
         for name in ("torso", "head", "l_hand", "r_lower_arm", "l_upper_leg", "r_foot"):
             one, other = (Rotation.from_quat(b[:, player.body(name)]) for b in bodies)
             assert ((turn * one).inv() * other).magnitude().max() < np.radians(10.0), name
+
+
+@pytest.mark.parametrize("clip", ["cmu/02_01.bvh", "cmu/06_03.bvh", "ballplay_m/044_006pickle_lleg_2.pt"])
+def test_recordings_on_other_skeletons(player, mocap, clip):
+    """Bones along X, mirrored on the right: near the file's own T-pose."""
+    motion, _ = read_clip(mocap / clip)
+    motion = at_its_rest(replace(motion, positions=None))
+    mapping = replace(find_mapping(motion), palms={})
+    plain = retargeted(player, motion, mapping)
+    for right in (1.0, -1.0):
+        mean, most = apart(player, plain, retargeted(player, in_a_line(motion, right), mapping))
+        assert mean < 0.03 and most < 0.11
 
 
 def test_a_mapping_may_say_what_the_rest_pose_is(player, walk):
