@@ -72,16 +72,6 @@ class Bones:
 
 def find_bones(model: Model, motion: Motion, mapping: Mapping) -> Bones:
     """The bones that a mapping names, in the motion's words. Raises MappingError for limbs that are none."""
-    zero = model.zero_pose[:, :3]
-    limbs, collars = [], []
-    for hinge in sorted(mapping.limbs, key=lambda h: -zero[pose.limb_bodies(model, h)[0], 1]):
-        limbs.append(_limb(model, motion, mapping, hinge))
-        upper = pose.limb_bodies(model, hinge)[0]
-        collar = int(model.body_parent[upper])
-        joint = mapping.bodies.get(model.body_names[collar])
-        if hinge in mapping.arms and joint is not None:
-            start, shoulder = motion.index(joint), limbs[-1].joints[0]
-            collars.append(_row(motion, path(motion.parents, start, shoulder), zero[upper] - zero[collar]))
     for table in ("legs", "arms"):
         if len(getattr(mapping, table)) != 2:
             raise MappingError(f"{mapping.name}: {table}: should be a left and a right one")
@@ -89,11 +79,14 @@ def find_bones(model: Model, motion: Motion, mapping: Mapping) -> Bones:
     if root not in mapping.bodies:
         raise MappingError(f"{mapping.name}: bodies.{root}: missing")
     pelvis = motion.index(mapping.bodies[root])
+    left_first = sorted(mapping.limbs, key=lambda h: -model.zero_pose[pose.limb_bodies(model, h)[0], 1])
+    limbs = [_limb(model, motion, mapping, hinge) for hinge in left_first]
+    arms = tuple(limb for limb in limbs if limb.hinge in mapping.arms)
     return Bones(
         pelvis,
         tuple(limb for limb in limbs if limb.hinge in mapping.legs),
-        tuple(limb for limb in limbs if limb.hinge in mapping.arms),
-        tuple(collars),
+        arms,
+        tuple(row for arm in arms for row in _collar(model, motion, mapping, arm)),
         _row(motion, _spine(model, motion, mapping, pelvis), UP),
     )
 
@@ -113,6 +106,17 @@ def _limb(model: Model, motion: Motion, mapping: Mapping, hinge: str) -> Limb:
     if hinge in mapping.legs:
         line = zero[model.children(end)[0]] - zero[end] if model.children(end) else np.array([1.0, 0.0, 0.0])
     return Limb(row.joints, row.bones, row.line, hinge, middle, _row(motion, _end(motion, far), line))
+
+
+def _collar(model: Model, motion: Motion, mapping: Mapping, arm: Limb) -> list[Row]:
+    """The row from an arm's collar bone to its shoulder; none where model, mapping or skeleton has none."""
+    upper = pose.limb_bodies(model, arm.hinge)[0]
+    collar = int(model.body_parent[upper])
+    joint = mapping.bodies.get(model.body_names[collar])
+    if joint is None or len(model.children(collar)) > 1:
+        return []
+    joints = path(motion.parents, motion.index(joint), arm.joints[0])
+    return [_row(motion, joints, model.zero_pose[upper, :3] - model.zero_pose[collar, :3])] if joints else []
 
 
 def _row(motion: Motion, joints: list[int], line: np.ndarray) -> Row:

@@ -117,7 +117,8 @@ def _pelvis(mapping: Mapping, bones: Bones, at: np.ndarray, turns: Rotation) -> 
 def _across(motion: Motion, bones: Bones) -> dict[int, Lines]:
     """Joint -> a direction across its bone that other bones show: collar bones at the chest, knuckles."""
     found = {}
-    for left, right in ([row.joints[0] for row in bones.collars if row.joints], bones.shoulders):
+    collars = [row.joints[0] for row in bones.collars]
+    for left, right in (collars if len(collars) == 2 else bones.shoulders, bones.shoulders):
         across = motion.offsets[left] - motion.offsets[right]
         if motion.parents[left] == motion.parents[right] and np.linalg.norm(across) > POINT:
             found[int(motion.parents[left])] = across, LEFT

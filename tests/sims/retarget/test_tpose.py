@@ -53,6 +53,12 @@ def walk(player):
     return with_more(person(player, frames, turns=turns), ends | fingers())
 
 
+@pytest.fixture(scope="module")
+def plain(player, walk):
+    """The walk on the player, from a skeleton with a T-pose."""
+    return retargeted(player, walk)
+
+
 DRAWN = {
     "A": lambda m: zero_at(m, LeftArm=[-45, 0, 0], RightArm=[45, 0, 0]),
     "A, elbows bent": lambda m: zero_at(m, LeftArm=[-45, 0, 0], RightArm=[45, 0, 0], LeftForeArm=[0, 0, -20]),
@@ -90,24 +96,24 @@ def apart(player, one, other):
 
 
 @pytest.mark.parametrize("drawn", DRAWN)
-def test_zero_angles_may_be_any_pose(player, walk, drawn):
+def test_zero_angles_may_be_any_pose(player, walk, plain, drawn):
     """Nothing is lost but what a bent elbow hides of the hand, and it is said."""
     result = retargeted(player, DRAWN[drawn](walk))
-    mean, most = apart(player, result, retargeted(player, walk))
+    mean, most = apart(player, result, plain)
     assert mean < 0.005 and most < 0.02
     assert len(result.notes) == 1 and result.notes[0].startswith("T-pose: the rest pose, ")
 
 
 @pytest.mark.parametrize("drawn", LINES)
-def test_zero_angles_may_be_nobody_s_pose(player, walk, drawn):
+def test_zero_angles_may_be_nobody_s_pose(player, walk, plain, drawn):
     result = retargeted(player, LINES[drawn](walk))
-    mean, most = apart(player, result, retargeted(player, walk))
+    mean, most = apart(player, result, plain)
     assert mean < 0.02 and most < 0.06
     assert result.notes[0].startswith("T-pose: built from the bones' directions and the clip")
 
 
-def test_a_t_pose_is_left_alone_without_a_word(player, walk):
-    assert retargeted(player, walk).notes == ()
+def test_a_t_pose_is_left_alone_without_a_word(plain):
+    assert plain.notes == ()
 
 
 @pytest.mark.parametrize("drawn", ["A", "in a line"])
@@ -144,10 +150,10 @@ def test_roll_bones_and_a_root_that_carries_the_person_change_nothing(player, wa
     assert apart(player, result, retargeted(player, draw(walk)))[1] < 0.002
 
 
-def test_feet_without_toes_and_hands_without_fingers(player, walk):
+def test_feet_without_toes_and_hands_without_fingers(player, walk, plain):
     """Less is known of them, and they still go where they went."""
     bare = without(in_a_line(walk), ("Toe", "Hand", "_end"))
-    mean, most = apart(player, retargeted(player, bare), retargeted(player, walk))
+    mean, most = apart(player, retargeted(player, bare), plain)
     assert mean < 0.03 and most < 0.1
 
 
@@ -177,7 +183,7 @@ def test_recordings_on_other_skeletons(player, mocap, clip):
         assert mean < 0.03 and most < 0.11
 
 
-def test_a_mapping_may_say_what_the_rest_pose_is(player, walk):
+def test_a_mapping_may_say_what_the_rest_pose_is(player, walk, plain):
     hanging = DRAWN["arms hanging"](walk)
     result = retargeted(player, hanging, replace(read_mapping("cmu"), rest="recorded"))
     assert result.notes == (
@@ -185,7 +191,41 @@ def test_a_mapping_may_say_what_the_rest_pose_is(player, walk):
     )
     result = retargeted(player, hanging, replace(read_mapping("cmu"), rest="directions"))
     assert result.notes[0].endswith("; the mapping asks for it")
-    assert apart(player, result, retargeted(player, walk))[0] < 0.02
+    assert apart(player, result, plain)[0] < 0.02
+
+
+def test_a_mapping_without_collar_bones(player, walk):
+    cmu = read_mapping("cmu")
+    mapping = replace(
+        cmu, bodies={body: joint for body, joint in cmu.bodies.items() if "clavicle" not in body}
+    )
+    plain = retargeted(player, walk, mapping)
+    for drawn in ("A", "in a line"):
+        assert apart(player, plain, retargeted(player, (DRAWN | LINES)[drawn](walk), mapping))[0] < 0.02
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"bodies": "pelvis"}, r"bodies\.pelvis: missing"),
+        ({"arms": "l_elbow"}, "arms: should be a left and a right one"),
+        ({"bodies": "head"}, "bodies: names no head; a T-pose from directions needs it"),
+    ],
+)
+def test_what_a_mapping_must_name(player, walk, change, said):
+    cmu = read_mapping("cmu")
+    ((table, key),) = change.items()
+    rest = {k: v for k, v in getattr(cmu, table).items() if k != key}
+    with pytest.raises(MappingError, match=f"^cmu: {said}$"):
+        retarget(player, in_a_line(walk), replace(cmu, **{table: rest}))
+
+
+def test_one_pose_is_enough(player, walk):
+    """A clip that stands still shows no axis of a knee or elbow."""
+    still = replace(
+        walk, rotations=walk.rotations[:1].repeat(5, axis=0), root_position=walk.root_position[:5]
+    )
+    assert apart(player, retargeted(player, in_a_line(still)), retargeted(player, still))[1] < 0.06
 
 
 def test_exchanged_sides_are_refused(player, walk):
