@@ -13,16 +13,15 @@ import numpy as np
 from ..model import Model
 from ..recording import Motion
 from ..reference import Reference
-from ..retarget.retarget import Retargeted
+from ..retarget.retarget import Retargeted, goal_joints
 from ..signals import runs
 from . import flight
 from .hands import Hands, find_hands
 from .possession import Flight, infer
+from .recorded import recorded_touch
 
 ALIKE, BOUNCED = 0.7, 0.2
 """[m] A recorded ball that comes lower than the second has bounced."""
-HELD = 0.2
-"""[m] A recorded ball is held by a hand on whose palm it would lie within this distance, or by the nearer."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +50,13 @@ class Ball:
         return found
 
 
-def inferred_ball(model: Model, reference: Reference) -> Ball | None:
+def inferred_ball(model: Model, reference: Reference, scale: float = 1.0) -> Ball | None:
     """The ball that the hands of a reference play with, from their motion alone; None when nothing shows
-    one."""
-    hands = find_hands(model, reference)
-    possession = infer(hands)
+    one. scale: of the model to the person who moved (`Retargeted.scale`), whose ball it was."""
+    possession = infer(find_hands(model, reference, scale))
     if not possession.touch.any():
         return None
+    hands = find_hands(model, reference)
     path = ball_path(hands, possession.touch, possession.flights)
     rows = find_checkpoints(path[:, 2], possession.touch)
     heights = tuple(_height(hands, possession.touch, row) for row in rows)
@@ -67,15 +66,15 @@ def inferred_ball(model: Model, reference: Reference) -> Ball | None:
 def recorded_ball(model: Model, retargeted: Retargeted, motion: Motion) -> Ball | None:
     """The ball as `motion` recorded it, in the world of the motion that was retargeted; None when it has
     none."""
-    motion = motion.resample(1.0 / model.timestep)
-    if motion.ball is None or motion.ball_held is None:
+    motion = retargeted.mapping.plain(motion).resample(1.0 / model.timestep)
+    if motion.ball is None:
         return None
+    joints = goal_joints(model, retargeted.mapping)
+    left, right = (joints[hand] for hand in model.roles.both("hands"))
+    touch = recorded_touch(motion, (left, right), model.ball_radius)
     hands = find_hands(model, retargeted.reference)
     path = retargeted.scale * motion.ball - retargeted.ground[:, None] * [0.0, 0.0, 1.0]
     _set_on_ground(path, hands.radius)
-    apart = np.linalg.norm(hands.centre - path[:, None], axis=2)
-    near = (apart < HELD) | (apart == apart.min(axis=1, keepdims=True))
-    touch = motion.ball_held[:, None] & near
     rows = find_checkpoints(path[:, 2], touch)
     heights = tuple(_height(hands, touch, row) for row in rows)
     return Ball(path, touch, rows, heights, recorded=True)
@@ -156,8 +155,8 @@ def _fly(path: np.ndarray, hands: Hands, way: Flight) -> None:
     speed = flight.speed_to_meet(start[2], end[2], times[-1], hands.radius)
     inside = slice(way.release, way.catch + 1)
     path[inside] = start + (times / times[-1])[:, None] * (end - start)
-    if speed is not None:
-        path[inside, 2] = flight.Bounce(start[2], speed, hands.radius).at(times)
+    if np.isfinite(speed):
+        path[inside, 2] = flight.Bounce(start[2], float(speed), hands.radius).at(times)
 
 
 def _height(hands: Hands, touch: np.ndarray, row: int) -> float:

@@ -7,13 +7,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import brentq
 
 T = TypeVar("T", float, np.ndarray)
 GRAVITY, BOUNCE = 9.81, 0.8
 """[m/s^2] and [-], of the ball in references; the simulated one has its model's."""
-FASTEST = 15.0
-"""[m/s] at which a ball leaves a hand."""
+SLOWEST, FASTEST = -2.0, 15.0
+"""[m/s] downward, at which a ball leaves a hand."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +50,22 @@ class Bounce:
         return np.where(since < self.down, self.falling(since), rising)
 
 
-def speed_to_meet(height: float, after: float, duration: float, radius: float) -> float | None:
-    """Downward speed [m/s] with which a ball bounces once from `height` to the height `after` [m] in
-    `duration` [s]; None when there is none."""
-
-    def missed(speed: float) -> float:
-        return float(Bounce(height, speed, radius).at(np.array(duration))) - after
-
-    speeds = np.linspace(-2.0, FASTEST, 171)
-    low = next((v for v in speeds if Bounce(height, v, radius).down < duration), None)
-    if low is None or missed(low) > 0.0 or missed(FASTEST) < 0.0:
-        return None
-    return float(brentq(missed, low, FASTEST))
+def speed_to_meet(
+    height: float, after: np.ndarray | float, duration: np.ndarray | float, radius: float
+) -> np.ndarray:
+    """Downward speeds [m/s] with which a ball bounces once from `height` to the heights `after` [m] in the
+    times `duration` [s]; nan where there is none from SLOWEST to FASTEST."""
+    after, duration = np.broadcast_arrays(np.asarray(after, float), np.asarray(duration, float))
+    fall = max(height - radius, 0.0)
+    least, most = np.full(duration.shape, 1e-6), np.maximum(duration, 2e-6)
+    for _ in range(50):  # the later it falls, the lower it is in the end: its time down, by halving
+        down = 0.5 * (least + most)
+        up = duration - down
+        rises = BOUNCE * (fall / down + 0.5 * GRAVITY * down) * up - 0.5 * GRAVITY * up**2
+        high = rises > after - radius
+        least, most = np.where(high, down, least), np.where(high, most, down)
+    speed = fall / down - 0.5 * GRAVITY * down
+    return np.where((speed >= SLOWEST) & (speed <= FASTEST), speed, np.nan)
 
 
 def speed_to_return(height: float, radius: float) -> float:

@@ -46,10 +46,10 @@ class Retarget(ClipInput):
         for line in _table(accuracy(model, result)):
             say(line)
         if "ball" in model.body_names:
-            for name, ball in (
-                ("inferred", inferred_ball(model, result.reference)),
-                ("recorded", recorded_ball(model, result, motion)),
-            ):
+            inferred = inferred_ball(model, result.reference, result.scale)
+            if inferred is None:
+                say("ball        inferred: none, nothing that the hands do shows one")
+            for name, ball in (("inferred", inferred), ("recorded", recorded_ball(model, result, motion))):
                 if ball is not None:
                     for line in _ball(name, ball, model.timestep):
                         say(line)
@@ -124,6 +124,8 @@ def _ball(name: str, ball: Ball, timestep: float) -> list[str]:
     tops = ", ".join(
         f"{r * timestep:.2f} s ({h:.2f} m)" for r, h in list(zip(ball.checkpoints, ball.heights))[:12]
     )
+    if not lines:
+        lines.append(f"ball        {name}: nobody touches it")
     if tops:
         lines.append(f"            {name}: highest at {tops}")
     return lines

@@ -9,17 +9,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import reduce
-from operator import add
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..clips.read import SUFFIXES, read_clip
 from ..sims import Model
-from ..sims.ball.ball import inferred_ball
-from ..sims.ball.contact_score import ContactScore, score_contacts
 from ..sims.retarget.accuracy import LIMBS, accuracy
 from ..sims.retarget.retarget import retargeted
 from .markers import check_page, write_measured
@@ -30,12 +24,9 @@ Row = dict[str, Any]
 """Numbers of one clip by name, and the clip's name."""
 
 
-def measure(
-    model: Model, folder: Path, say: Callable[[str], None] = lambda line: None
-) -> tuple[list[Row], dict[str, ContactScore]]:
-    """Rows of numbers, one per clip, and clip -> score of the inferred contacts where a ball was recorded."""
+def measure(model: Model, folder: Path, say: Callable[[str], None] = lambda line: None) -> list[Row]:
+    """Rows of numbers, one per clip."""
     rows: list[Row] = []
-    scores: dict[str, ContactScore] = {}
     for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in SUFFIXES):
         motion, _ = read_clip(path)
         result = retargeted(model, motion)
@@ -54,21 +45,12 @@ def measure(
         }
         row |= {limb: 100 * fit.limbs[limb][0] for limb in LIMBS if limb in fit.limbs}
         rows.append(row)
-        held = motion.resample(1.0 / model.timestep).ball_held
-        if held is not None:
-            ball = inferred_ball(model, result.reference)
-            touch = np.any(ball.touch, axis=1) if ball is not None else np.zeros_like(held)
-            scores[row["clip"]] = score_contacts(touch, held, model.timestep)
         say(f"{row['clip']}: mean {row['mean']:.1f} cm, slide {row['slide']:.1f} mm/s")
-    return rows, scores
+    return rows
 
 
-def tables(rows: list[Row], scores: dict[str, ContactScore]) -> str:
+def tables(rows: list[Row]) -> str:
     """Both tables as Markdown."""
-    return "\n".join([*_fit_lines(rows), "", *_contact_lines(scores)])
-
-
-def _fit_lines(rows: list[Row]) -> list[str]:
     limbs = [limb for limb in LIMBS if limb in rows[0]]
     lines = ["### Joints, feet and ground", "", f"{len(rows)} clips; misses of the goals in bold.", ""]
     lines.append("| goal | clips that miss it | worst |\n|---|---|---|")
@@ -93,33 +75,7 @@ def _fit_lines(rows: list[Row]) -> list[str]:
         cells += [_cell(row, "deep"), f"{row['stands']:.0f}"]
         lines.append(f"| {' | '.join(cells)} |")
     lines += ["", "Errors in cm, slide in mm/s, deepest point under the ground in mm, stands in % of frames."]
-    return lines
-
-
-def _contact_lines(scores: dict[str, ContactScore]) -> list[str]:
-    if not scores:
-        return []
-    total = reduce(add, scores.values())
-    moving = {clip: s for clip, s in scores.items() if s.timing or s.missed}
-    good = sum(s.precision >= 0.9 and s.recall >= 0.9 for s in scores.values())
-    late = np.array(total.timing)
-    lines = [
-        "### Contacts of hand and ball",
-        "",
-        f"Over {len(scores)} clips with a recorded ball: precision {total.precision:.3f}, recall "
-        f"{total.recall:.3f} of contact frames within 50 ms; {good} clips have both at 0.9 or more. Of "
-        f"{len(late) + total.missed} beginnings and ends of contact, {len(late)} have an inferred one "
-        f"within 300 ms, off by {1000 * np.abs(late).mean():.0f} ms on average, "
-        f"by {1000 * np.median(late):+.0f} ms in the median (positive: too late).",
-        "",
-        "| clip | precision | recall | off by ms | edges missed |\n|---|---:|---:|---:|---:|",
-    ]
-    for clip, s in (moving | scores).items():
-        off = f"{1000 * np.mean(np.abs(s.timing)):.0f}" if s.timing else "-"
-        edges = len(s.timing) + s.missed
-        marks = [f"{v:.2f}" if v >= 0.9 else f"**{v:.2f}**" for v in (s.precision, s.recall)]
-        lines.append(f"| {clip} | {marks[0]} | {marks[1]} | {off} | {s.missed} of {edges} |")
-    return lines
+    return "\n".join(lines)
 
 
 def _cell(row: Row, key: str) -> str:
@@ -129,8 +85,8 @@ def _cell(row: Row, key: str) -> str:
 
 def main(folder: Path, page: Path) -> None:
     check_page(page)
-    rows, scores = measure(Model.load("player"), folder, lambda line: print(line, flush=True))
-    write_measured(page, tables(rows, scores))
+    rows = measure(Model.load("player"), folder, lambda line: print(line, flush=True))
+    write_measured(page, tables(rows))
 
 
 if __name__ == "__main__":

@@ -42,7 +42,10 @@ def draft(
     part = motion.slice(first, last)
     result = retargeted(model, part, wanted)
     ball = recorded_ball(model, result, part)
-    ball = ball if ball is not None and ball.touch.any() else inferred_ball(model, result.reference)
+    if ball is None:
+        ball = inferred_ball(model, result.reference, result.scale)
+    elif not ball.touch.any():
+        ball = None
     lines = [
         f'name = "{_quoted(name or clip.stem)}"',
         f'description = "{_quoted(f"first draft, {part.duration:.2f} s at {part.rate:.4g} Hz")}"',
@@ -57,7 +60,7 @@ def draft(
     for c in others:
         lines.append(f"# also a cycle: frames = [{c.first}, {c.last}], ends {100 * c.pose_gap:.1f} cm apart")
     if ball is None:
-        lines += ["", "# No ball shows in the hands' motion."]
+        lines += ["", "# No ball shows in the hands' motion, or nobody touches the recorded one."]
     else:
         said = "recorded" if ball.recorded else "inferred from the hands' motion: check it"
         lines += ["", f"# Seconds from the first frame; {said}.", "[contact]"]

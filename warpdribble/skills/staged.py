@@ -158,8 +158,10 @@ def _recorded(
     ball = None
     if model.roles.ball is not None:
         ball = recorded_ball(model, result, motion)
-        if ball is None or not ball.touch.any():
-            ball = inferred_ball(model, result.reference)
+        if ball is None:
+            ball = inferred_ball(model, result.reference, result.scale)
+        elif not ball.touch.any():
+            ball, notes = None, [*notes, "nobody touches the recorded ball: left out"]
     notes = [*notes, *result.notes, f"joints {accuracy(model, result).summary}"]
     return result.reference, ball, notes
 

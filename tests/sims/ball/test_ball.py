@@ -65,7 +65,7 @@ def test_a_ball_comes_back(height):
 
 
 def test_a_flight_that_cannot_be_is_none():
-    assert speed_to_meet(0.8, 3.0, 0.2, R) is None
+    assert np.isnan(speed_to_meet(0.8, 3.0, 0.2, R))
 
 
 def test_a_thrown_ball_bounces_lower_and_lower():
@@ -92,7 +92,7 @@ def test_the_authored_dribble_s_ball_is_found_from_its_hand(player):
     true = np.concatenate([np.tile(clip.ball.touch[:-1].any(axis=1), 4), [True]])
     score = score_contacts(ball.touch.any(axis=1), true, player.timestep)
     assert score.recall > 0.95 and score.missed == 0
-    assert [f.release for f in ball.flights] == pytest.approx([1 + 70 * k for k in range(5)], abs=8)
+    assert [f.release for f in ball.flights] == pytest.approx([1 + 70 * k for k in range(4)], abs=8)
     assert ball.heights[1:-1] == pytest.approx([clip.ball.heights[0]] * len(ball.heights[1:-1]), abs=0.03)
 
 
@@ -101,23 +101,25 @@ def test_the_authored_dribble_s_ball_is_found_from_its_hand(player):
     [
         "ballplay_m/044_006pickle_lleg_2.pt",
         "ballplay_m/041_018pickle_pick2back_7.pt",
+        "ballplay_m/040_018pickle_rturnover_30.pt",
         "ballplay_m/013_018pickle_run_3.pt",
         "ballplay_m/001_007pickle_pick_002.pt",
     ],
 )
 def test_contacts_agree_with_the_recorded_ball(player, mocap, name):
     motion, result = retargeted_clip(player, mocap, name)
-    ball, true = inferred_ball(player, result.reference), recorded_ball(player, result, motion)
-    score = score_contacts(ball.touch.any(axis=1), true.touch.any(axis=1), player.timestep)
-    assert score.precision > 0.9 and score.recall > 0.9
-    assert score.missed == 0 and np.abs(score.timing).mean() < 0.15
+    ball, true = inferred_ball(player, result.reference, result.scale), recorded_ball(player, result, motion)
+    for hand in (0, 1):
+        score = score_contacts(ball.touch[:, hand], true.touch[:, hand], player.timestep)
+        assert score.precision > 0.9 and score.recall > 0.8
+        assert score.missed == 0 and np.abs([0.0, *score.timing]).mean() < 0.15
     assert np.linalg.norm(np.diff(ball.path, axis=0), axis=1).max() < 0.25
     assert ball.path[:, 2].min() > 0.1
 
 
 def test_checkpoints_and_heights_agree_with_the_recorded_ball(player, mocap):
     motion, result = retargeted_clip(player, mocap, "ballplay_m/044_006pickle_lleg_2.pt")
-    ball, true = inferred_ball(player, result.reference), recorded_ball(player, result, motion)
+    ball, true = inferred_ball(player, result.reference, result.scale), recorded_ball(player, result, motion)
     assert len(ball.checkpoints) == len(true.checkpoints) == 3
     assert np.abs(np.subtract(ball.checkpoints, true.checkpoints)).max() < 10
     assert np.abs(np.subtract(ball.heights, true.heights)).max() < 0.03
@@ -125,8 +127,10 @@ def test_checkpoints_and_heights_agree_with_the_recorded_ball(player, mocap):
 
 def test_hands_that_push_are_told_from_arms_that_swing(player, mocap):
     for name in ("cmu/02_01.bvh", "cmu/09_01.bvh", "cmu/09_11.bvh"):
-        assert inferred_ball(player, retargeted_clip(player, mocap, name)[1].reference) is None, name
-    ball = inferred_ball(player, retargeted_clip(player, mocap, "cmu/06_10.bvh")[1].reference)
+        _, result = retargeted_clip(player, mocap, name)
+        assert inferred_ball(player, result.reference, result.scale) is None, name
+    _, result = retargeted_clip(player, mocap, "cmu/06_10.bvh")
+    ball = inferred_ball(player, result.reference, result.scale)
     pushes = [f for f in ball.flights if f.hand == 1]
     assert len(pushes) >= 10  # 1.21 Hz for 7.7 s, and what comes before and after
 
