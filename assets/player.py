@@ -11,6 +11,8 @@ world coordinates of the zero pose. The right side is the mirror image of the le
 * de Leva 1996, J. Biomech. 29(9), table 4, men: masses, lengths, centres of mass of the limbs.
 * Winter 2009, *Biomechanics and Motor Control of Human Movement*, fig. 4.1: ankle and shoulder.
 * Buryanov & Kotiuk 2010, Int. J. Morphol. 28(3): fingers. Bell 1990, J. Biomech. 23(6): hips.
+* Taylor & Schwarz 1955, Artificial Limbs 2(2): a hand at rest, "more and more flexed from index to
+  little finger"; goniometry of that cascade: Asha et al. 2015, Orthop. Rheumatol. 1(1).
 * AAOS 1965, *Joint Motion*: ranges. A ball joint has one cone about the T-pose: the widest of its
   ranges, and the wrist's holds the forearm's pronation too.
 * Depths of the trunk, the hand's spread and the fist were chosen by eye.
@@ -87,14 +89,39 @@ COLOURS = {"skin": "0.80 0.60 0.47 1", "hair": "0.18 0.13 0.10 1", "jersey": "0.
 
 # Left side of the stand: rotation vectors of ball joints, angles of hinges; all others are zero.
 STAND = {"shoulder": np.array([-1.42, 0, 0]), "elbow": np.array([0.25])}
-FIST = {finger: (1.45, 1.65, 1.0) for finger in FINGERS} | {"thumb": (0.55, 0.75, 0.9)}
-# P1 Eq. 1: lambda of the way from the flat hand (all zero) to the fist; P1's idle hand has 0.2.
+Hand = dict[str, tuple[float, ...]]
+"""Finger -> turn of its first joint in the palm's plane, from +X to +Y on the left, and curl of all three
+[rad]."""
+FIST: Hand = {**{finger: (0.0, 1.45, 1.65, 1.0) for finger in FINGERS}, "thumb": (0.0, 0.55, 0.75, 0.9)}
+RELAXED: Hand = {  # the fingers lie side by side, the thumb beside the index finger
+    finger: tuple(np.radians(degrees))
+    for finger, degrees in {
+        "thumb": (14, 12, 18, 14),
+        "index": (8, 28, 36, 14),
+        "middle": (0, 33, 40, 17),
+        "ring": (-8, 37, 43, 19),
+        "pinky": (-16, 42, 46, 22),
+    }.items()
+}
+
+
+def closed(grip: float) -> Hand:
+    """P1 Eq. 1: lambda of the way from the flat hand (all zero) to the fist."""
+    return {finger: tuple(grip * angle for angle in angles) for finger, angles in FIST.items()}
+
+
 HOLD = {  # the ball at rest on the upturned right palm
     "r_elbow": 1.5,
     "r_wrist": np.array([0.1218, -1.7173, 0]),
     "ball": (0.347, -0.209, 1.234),
 }
-KEYFRAMES = {"start": (0.2, {}), "flat": (0.0, {}), "fist": (1.0, {}), "hold": (0.2, HOLD)}
+KEYFRAMES: dict[str, tuple[Hand, dict[str, Any]]] = {
+    "start": (RELAXED, {}),
+    "flat": (closed(0.0), {}),
+    "ready": (closed(0.2), {}),  # P1's idle hand, which waits for the ball
+    "fist": (closed(1.0), {}),
+    "hold": (closed(0.2), HOLD),
+}
 
 BALL_RADIUS, BALL_MASS, BALL_XY = 0.1193, 0.6237, (0.35, -0.35)
 MIRROR = np.array([1, -1, 1])
@@ -293,17 +320,21 @@ def bodies() -> list[Body]:
     return trunk() + [b for part in left for b in [*part, *(b.mirrored() for b in part)]]
 
 
-def target(body: Body, grip: float, pose: dict[str, Any]) -> np.ndarray:
-    """Rotation vector or angle [rad] of a joint in the stand, hands closed by `grip`, with `pose` in
-    place of the stand for the joints that it names."""
+def target(body: Body, fingers: Hand, pose: dict[str, Any]) -> np.ndarray:
+    """Rotation vector or angle [rad] of a joint in the stand with such fingers, and with `pose` in place
+    of the stand for the joints that it names."""
     if body.joint in pose:
         return np.atleast_1d(pose[body.joint])
     side, _, name = body.joint.partition("_")
     size = 3 if JOINTS[body.drive][0] == "ball" else 1
     finger = name.split("_")[0]
     if finger in FIST:
-        curl = grip * FIST[finger][("mcp", "pip", "dip").index(body.drive)]
-        return curl * body.axis if size == 3 else np.array([curl])
+        aside, *curls = fingers[finger]
+        curl = curls[("mcp", "pip", "dip").index(body.drive)]
+        if size == 1:
+            return np.array([curl])
+        turn = Rotation.from_rotvec([0, 0, -aside if side == "r" else aside])
+        return (turn * Rotation.from_rotvec(curl * body.axis)).as_rotvec()
     angle = STAND.get(name, np.zeros(size))
     return -angle * MIRROR if side == "r" and size == 3 else angle
 
@@ -378,8 +409,8 @@ def mjcf() -> str:
         add(custom, "text", name=role, data=name)
 
     keyframe, upright = add(root, "keyframe"), vec(1, 0, 0, 0)
-    for name, (grip, pose) in KEYFRAMES.items():
-        ctrl = [target(b, grip, pose) for b in player[1:]]
+    for name, (fingers, pose) in KEYFRAMES.items():
+        ctrl = [target(b, fingers, pose) for b in player[1:]]
         ball_at = pose.get("ball", (*BALL_XY, BALL_RADIUS))
         q = [Rotation.from_rotvec(t).as_quat(scalar_first=True) if len(t) == 3 else t for t in ctrl]
         qpos: list[Any] = [player[0].at, upright, *q, ball_at, upright]

@@ -52,7 +52,7 @@ class Dribble:
     feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
     """Left and right ankle: forward, left, turned out."""
     curl: float = 1.0
-    """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `start` pose."""
+    """Of the dribbling fingers: 0 is the model's `flat` pose, 1 its `ready` pose."""
     fingers: tuple[float, float] = (10.0, 34.0)
     """Tilt of the fingers below the horizon, on the ball and after the release."""
     roll: float = 3.5
@@ -176,8 +176,8 @@ def stroke(style: Dribble, radius: float) -> tuple[float, Heights, Heights]:
 
 
 def fingers(model: Model, curl: float, sides: str = "r") -> np.ndarray:
-    """The start pose (nq,) with the fingers of these sides part of the way from flat to it."""
-    poses = np.stack([model.keyframes["flat"], model.start_q])
+    """The start pose (nq,) with the fingers of these sides part of the way from flat to ready."""
+    poses = np.stack([model.keyframes["flat"], model.keyframes["ready"]])
     joint_q = np.array(model.start_q, dtype=float)
     between = resample_q(model, poses, np.array([curl]))[0]
     for joint in model.joint_names:

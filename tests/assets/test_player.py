@@ -1,6 +1,7 @@
 """The player's MJCF against its tables, its own mirror image, and MuJoCo."""
 
 import warnings
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -232,7 +233,7 @@ def test_collisions_are_with_the_ground_and_the_ball_only(model):
     assert model.geom_user[model.geom("ball").id, 0] == 0.8
 
 
-@pytest.mark.parametrize("key", ["start", "flat", "fist"])
+@pytest.mark.parametrize("key", ["start", "flat", "ready", "fist"])
 def test_keyframes_stand_on_the_ground(model, key):
     data = at(model, key)
     for side in "lr":
@@ -255,17 +256,46 @@ def test_keyframes_stand_on_the_ground(model, key):
 
 
 def test_hands_close_from_flat_to_fist(model):
-    flat, start, fist = (at(model, key) for key in ("flat", "start", "fist"))
+    flat, ready, fist = (at(model, key) for key in ("flat", "ready", "fist"))
     for finger in FINGERS:
         reach = [
             np.linalg.norm(d.site(f"{finger}_tip").xpos - d.site(f"{finger[0]}_palm").xpos)
-            for d in (flat, start, fist)
+            for d in (flat, ready, fist)
         ]
         assert reach[0] > reach[1] > reach[2]
         assert reach[2] < 0.07
         bones = [flat.body(f"{finger}_{i}").xpos for i in (1, 2, 3)]
         a, b = bones[1] - bones[0], bones[2] - bones[1]
         assert a @ b == pytest.approx(np.linalg.norm(a) * np.linalg.norm(b), rel=1e-6)  # straight
+
+
+@pytest.mark.parametrize("side", "lr")
+def test_a_hand_at_rest_curls_more_toward_the_little_finger(model, side):
+    """Angles between the bones, read off their places: a cascade, as measured of hands at rest."""
+    data = at(model, "start")
+    palm = data.body(f"{side}_middle_1").xpos - data.body(f"{side}_hand").xpos
+    bones = {}
+    for finger in ("index", "middle", "ring", "pinky"):
+        a, b, c = (data.body(f"{side}_{finger}_{i}").xpos for i in (1, 2, 3))
+        bones[finger] = [palm, b - a, c - b, data.site(f"{side}_{finger}_tip").xpos - c]
+    unit = {finger: [x / np.linalg.norm(x) for x in four] for finger, four in bones.items()}
+    bends = {f: [np.degrees(np.arccos(a @ b)) for a, b in pairwise(x[:-1])] for f, x in unit.items()}
+    knuckle, middle = np.array(list(bends.values())).T
+    assert np.all(np.diff(knuckle) > 2.0) and knuckle[0] > 25.0 and knuckle[-1] < 45.0
+    assert np.all(np.diff(middle) > 2.0) and middle[0] > 35.0 and middle[-1] < 50.0
+
+
+@pytest.mark.parametrize("side", "lr")
+def test_fingers_at_rest_lie_side_by_side(model, side):
+    """Neighbouring middle bones: nearer than in the flat hand, a finger's thickness apart at the least."""
+    rest, flat = (at(model, key) for key in ("start", "flat"))
+    for one, two in zip(("index", "middle", "ring"), ("middle", "ring", "pinky")):
+        across = [
+            abs((d.body(f"{side}_{one}_3").xpos - d.body(f"{side}_{two}_3").xpos)
+                @ d.body(f"{side}_hand").xmat.reshape(3, 3)[:, 0])
+            for d in (rest, flat)
+        ]  # fmt: skip
+        assert 2 * player.FINGER_RADIUS < across[0] < 0.023 < across[1], (one, across)
 
 
 @pytest.mark.parametrize(

@@ -36,8 +36,10 @@ def test_coordinates_convert_by_name():
     q = full.keyframes["hold"]
     there = model.convert_q(full, q)
     np.testing.assert_allclose(there, model.keyframes["hold"])
-    back = full.convert_q(model, there)
-    np.testing.assert_allclose(back, q)  # hold has the start pose's fingers
+    wanted = q.copy()
+    for joint in set(full.joint_names) - set(model.joint_names):
+        wanted[full.q_slice(joint)] = full.start_q[full.q_slice(joint)]
+    np.testing.assert_allclose(full.convert_q(model, there), wanted)
 
 
 def test_a_pattern_without_joints_is_refused():
