@@ -83,24 +83,35 @@ def skimming(case: Case) -> float:
     return 100.0 * case.fit.skimming
 
 
-def clearance(case: Case) -> float | None:
-    """[cm] 95th percentile of how much higher or lower the ball of a swinging foot is over where it stood,
-    between the stands before and after, than the recorded one."""
+def lower(case: Case) -> float | None:
+    """[cm] 95th percentile of how much lower the ball of a swinging foot is than the recorded one."""
+    return _quantile(-_clearance(case))
+
+
+def higher(case: Case) -> float | None:
+    """[cm] The same of how much higher it is."""
+    return _quantile(_clearance(case))
+
+
+def _clearance(case: Case) -> np.ndarray:
+    """(n,) [cm] by which the ball of a swinging foot is higher than the recorded one, both measured from
+    where they are while it stands, between the stands before and after."""
     heights = case.result.scale * case.motion.places()[..., 2] - case.result.ground[:, None]
-    errors = []
+    errors = [np.zeros(0)]
     for foot, toe, stood, swings in case.swings():
         own = case.body_q[:, foot.toes, 2] - foot.drop
         low = stood & (own < 0.002)
         if low.any():
-            rows = np.arange(len(own))
-            off = np.interp(rows, rows[low], (own - heights[:, toe])[low])
-            spread = np.abs(own - heights[:, toe] - _steadied(off, low))
-            errors.append(spread[swings])
-    return 100.0 * float(np.quantile(np.concatenate(errors), 0.95)) if errors else None
+            errors.append((own - heights[:, toe] - _steadied(own - heights[:, toe], low))[swings])
+    return 100.0 * np.concatenate(errors)
+
+
+def _quantile(errors: np.ndarray) -> float | None:
+    return float(np.quantile(np.maximum(errors, 0.0), 0.95)) if len(errors) else None
 
 
 def _steadied(off: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Values (frames,), each stretch of `low` (frames,) bool at its median, straight lines between."""
+    """Values (frames,) with each stretch of `low` (frames,) bool at its median, straight lines between."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
     spans = edges.reshape(-1, 2)
     middles = spans.mean(axis=1) - 0.5
@@ -156,7 +167,8 @@ def joints(case: Case) -> float:
 
 MEASURES: dict[str, Callable[[Case], float | None]] = {
     "rows in which a foot skims the ground, %": skimming,
-    "clearance of swinging feet, 95 %, off by cm": clearance,
+    "swinging feet lower than recorded, 95 %, cm": lower,
+    "swinging feet higher than recorded, 95 %, cm": higher,
     "toes of swinging feet, 95 %, off by degrees": toes,
     "knee acceleration, 5 to 30 Hz, times the copied": knees,
     "a hand turns in 10 ms, at most, degrees": hands,
