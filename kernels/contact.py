@@ -10,7 +10,7 @@ import warp as wp
 
 from .bounce import BOUNCE_SPEED, bounce
 from .collide import Touch, probe
-from .kinematics import joint_dofs
+from .kinematics import joint_dofs, load3
 from .rows import rows_change, rows_velocity
 from .spatial import *
 from .tree import FREE, HINGE, Tree, World
@@ -236,8 +236,8 @@ def find(tree: Tree, world: World, g: int):
     far = fill(1.0)
     world.active[g, 2 * tree.slot_count] = 0
     world.active[g, 2 * tree.slot_count + 1] = 0
-    for i in range(tree.flight_count):
-        world.touched[g, tree.flight_link[i]] = far
+    for b in range(tree.flyer_count):
+        world.touched[g, tree.flyer_link[b]] = far
     for slot in range(tree.slot_count):
         if tree.slot_flight[slot] == 0:
             touch = probe(tree, world, g, slot)
@@ -256,22 +256,24 @@ def find(tree: Tree, world: World, g: int):
                 enlist(tree, world, g, slot, touch, near, goal)
             else:
                 world.impulse[g, slot] = zero3()
-    for f in range(tree.flight_count):
-        i = tree.flight_link[f]
-        slot = tree.flight_slot[f]
-        touch = probe(tree, world, g, slot)
-        v = parting(tree, world, g, slot, touch.point)
-        near = touch.gap - tree.h * norm(v)
+    for b in range(tree.flyer_count):
+        i = tree.flyer_link[b]
         free = world.touched[g, i] - margin
-        world.gap[g, slot] = touch.gap
-        world.knock[g, i] = fill(0.0)
-        if any_lt(near, margin):
-            hits = bounce(tree, world, g, i, slot, touch, free)
-            near = where_lt(fill(0.0), hits, far, near)
-            goal = wish(tree, world, g, slot, touch.gap, dot(touch.normal, v), neg(free))
-            enlist(tree, world, g, slot, touch, near, goal)
-        else:
-            world.impulse[g, slot] = zero3()
+        more = bounce(tree, world, g, b, free)
+        shift = load3(world.q, g, tree.link_q[i]) - world.pos[g, i]
+        for f in range(tree.flyer_flight[b], tree.flyer_flight[b + 1]):
+            slot = tree.flight_slot[f]
+            touch = probe(tree, world, g, slot)
+            v = parting(tree, world, g, slot, touch.point)
+            near = touch.gap - tree.h * norm(v)
+            world.gap[g, slot] = touch.gap
+            if any_lt(near, margin):
+                near = where_lt(fill(0.0), (1.0 - more) * world.knock[g, f], far, near)
+                gap = touch.gap + dot(touch.normal, shift)
+                goal = wish(tree, world, g, slot, gap, dot(touch.normal, v), neg(free))
+                enlist(tree, world, g, slot, touch, near, goal)
+            else:
+                world.impulse[g, slot] = zero3()
 
 
 @wp.func

@@ -37,7 +37,7 @@ class Tree:
     q_count: int
     dof_count: int
     slot_count: int
-    flight_count: int
+    flyer_count: int
     response_room: int
     """responses that `World.y` holds; what does not fit is worked out anew in each sweep"""
     sweeps: int
@@ -121,8 +121,15 @@ class Tree:
     """the first of them in response_dof"""
     response_dof: wp.array(dtype=int)
     slot_flight: wp.array(dtype=int)
-    """1: a free ball and the ground, its flight solved exactly (see `bounce`)"""
-    flight_link: wp.array(dtype=int)
+    """1: a flyer and a plane"""
+    flyer_link: wp.array(dtype=int)
+    """links of balls whose bounces off planes are exact (see `bounce`)"""
+    flyer_flight: wp.array(dtype=int)
+    """the first of each in flight_slot, and the end"""
+    flyer_even: wp.array(dtype=int)
+    """1: the same moment of inertia about every axis"""
+    flyer_ease: wp.array(dtype=wp.mat33)
+    """inverse of the inertia, link axes [1 / (kg m^2)]"""
     flight_slot: wp.array(dtype=int)
     pair_erp: wp.array(dtype=float)
     pair_cfm: wp.array(dtype=float)
@@ -180,9 +187,9 @@ class World:
     """slots in use by some lane of the group, each followed by its place in y; last, their number and
     the end of y"""
     touched: wp.array2d(dtype=Real)
-    """least distance of a link that bounces to anything but the ground [m]"""
+    """least distance of a flyer to anything but planes that it may come to within the step [m]"""
     knock: wp.array2d(dtype=Real)
-    """impulse of its bounce in this step [N s]"""
+    """impulse of a flyer's bounces off a plane in this step [N s]"""
 
     broken: wp.array2d(dtype=Real)
     fallen: wp.array2d(dtype=Real)
@@ -194,7 +201,8 @@ class World:
 COLUMNS = {
     "q": "q target",
     "dof": "qd joint_f s U d w",
-    "link": "mass_scale turn R pos r V A I p pull torque full touched knock",
+    "link": "mass_scale turn R pos r V A I p pull torque full touched",
+    "flight": "knock",
     "slot": "gap point normal goal impulse",
     "pair": "friction restitution",
     "body": "force",

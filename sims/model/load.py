@@ -37,11 +37,7 @@ def read_model(
     drives = read_drives(m, t, path)
     shapes = read_shapes(m)
     geoms = [g for g in range(m.ngeom) if int(m.geom_type[g]) in GEOMS]
-    links = {
-        "com": inertia["link_com"],
-        "count": np.bincount(bodies["body_link"][1:], minlength=len(t.link_parent)),
-    }
-    slots, pairs = build_slots(m, geoms, shapes, t, bodies, links)
+    slots, pairs, said = build_slots(m, geoms, shapes, t, bodies, inertia)
     stiffness = np.zeros(m.nv)
     for j in range(m.njnt):
         dofs = slice(m.jnt_dofadr[j], m.jnt_dofadr[j] + DOF_SIZE[JOINTS[int(m.jnt_type[j])]])
@@ -94,7 +90,7 @@ def read_model(
         "tables": tables,
         "pairs": pairs,
         "excluded": [(int(two >> 16) - 1, int(two & 0xFFFF) - 1) for two in m.exclude_signature],
-        "notes": notes + drives.notes,
+        "notes": notes + drives.notes + said,
     }
 
 

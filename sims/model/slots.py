@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from .joints import DOF_SIZE, FREE
+from .flights import Place, flyer_tables, lone_balls, told
+from .joints import DOF_SIZE
 from .mjcf import Shape, Tables
 
 if TYPE_CHECKING:
     import mujoco
 
-Place = tuple[int, np.ndarray, Rotation]
-"""A body's link, and its origin [m] and frame in it."""
 POINT_PLANE, SPHERE_CAPSULE, SPHERE_BOX, CAPSULE_CAPSULE = range(4)
 
 
@@ -130,10 +129,10 @@ def build_slots(
     shapes: list[Shape],
     tables: Tables,
     bodies: dict[str, np.ndarray],
-    links: dict[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], list[Pair]]:
-    """Arrays `slot_*`, `response_dof`, `shape_*`, `flight_*` for the kernels, and the pairs of shapes that
-    may touch; `geoms[k]` is the geom of shape k."""
+    inertia: dict[str, np.ndarray],
+) -> tuple[dict[str, np.ndarray], list[Pair], list[str]]:
+    """Arrays `slot_*`, `response_dof`, `shape_*`, `flyer_*`, `flight_*` for the kernels, the pairs of
+    shapes that may touch, and notes; `geoms[k]` is the geom of shape k."""
     chains = Chains(tables)
     place = [
         (
@@ -146,7 +145,8 @@ def build_slots(
     rows: list[dict[str, Any]] = []
     pairs: list[Pair] = []
     responses: list[list[int]] = []
-    flights = []
+    balls = lone_balls(shapes, place, tables, inertia["link_com"])
+    flights: dict[int, list[int]] = {ball: [] for ball in balls}
 
     def add(
         kind: int,
@@ -193,14 +193,10 @@ def build_slots(
             link_b, offset, turn = place[b]
             n = (place[a][2] * Rotation.from_quat(shapes[a].quat)).apply([0, 0, 1])
             at = place[a][1] + place[a][2].apply(shapes[a].pos)
-            # one ground at a time: a ball over two planes bounces by the solver's rule
-            grounds = sum(s.kind == "plane" for s in shapes)
-            lone = grounds == 1 and links["count"][link_b] == 1 and chains.joint[link_b] == FREE
             points = [(offset + turn.apply(p), radius) for p, radius in touch_points(shapes[b])]
             for point, radius in drop_shared(points, link_b, place, shapes, chains):
-                centred = np.allclose(point, links["com"][link_b], atol=1e-9)
-                if kinds[1] == "sphere" and lone and centred:
-                    flights.append((link_b, len(rows)))
+                if b in flights:
+                    flights[b].append(len(rows))
                 add(POINT_PLANE, a, b, (*n, n @ at), point, radius)
         elif kinds[1] == "sphere":
             add(SPHERE_BOX if kinds[0] == "box" else SPHERE_CAPSULE, a, b)
@@ -213,10 +209,10 @@ def build_slots(
             stacklevel=4,
         )
     table = {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
-    table["flight_link"], table["flight_slot"] = np.array(flights, int).reshape(-1, 2).T
+    table |= flyer_tables({int(place[ball][0]): slots for ball, slots in flights.items() if slots}, inertia)
     table["slot_flight"] = np.isin(np.arange(len(rows)), table["flight_slot"]).astype(int)
     table["response_dof"] = np.array([dof for dofs in responses for dof in dofs], int)
-    return table | shape_tables(shapes, place), pairs
+    return table | shape_tables(shapes, place), pairs, told(shapes, pairs, balls)
 
 
 def combine(m: mujoco.MjModel, ga: int, gb: int, a: Shape, b: Shape, ia: int, ib: int) -> Pair:

@@ -103,7 +103,7 @@ class Batch:
         tree.link_count = len(model.tables["link_parent"]) - 1
         tree.q_count, tree.dof_count = model.nq, model.nv
         tree.slot_count = len(model.tables.get("slot_kind", ()))
-        tree.flight_count = len(model.tables.get("flight_link", ()))
+        tree.flyer_count = len(model.tables.get("flyer_link", ()))
         tree.forced = 0
         lengths = model.tables.get("slot_length", np.zeros(0, int))
         tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
@@ -117,6 +117,7 @@ class Batch:
             "q": model.nq,
             "dof": model.nv,
             "link": tree.link_count + 1,
+            "flight": len(model.tables.get("flight_slot", ())),
             "slot": tree.slot_count,
             "pair": len(model.pairs),
             "body": model.nbody,

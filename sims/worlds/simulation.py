@@ -332,11 +332,8 @@ class Simulation(Batch):
         model, world = self.model, self._world
         count = self._tree.slot_count
         impulse = self._read(world.impulse)[:, :count]
-        knock = self._read(world.knock)
-        for link, slot in zip(
-            model.tables.get("flight_link", ()), model.tables.get("flight_slot", ()), strict=True
-        ):
-            impulse[:, slot, 0] += knock[:, link]
+        flights = model.tables.get("flight_slot", np.zeros(0, int))
+        impulse[:, flights, 0] += self._read(world.knock)[:, : len(flights)]
         pairs = model.tables.get("slot_pair", np.zeros(0, int))
         shapes = [model.pairs[pair]["shapes"] for pair in pairs]
         return Contacts(

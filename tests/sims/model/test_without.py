@@ -86,7 +86,7 @@ def test_every_table_has_its_length(full, stiff):
     assert t["slot_pair"].max() < len(stiff.pairs) == len(t["pair_erp"])
     shapes = [stiff.shapes[k] for pair in stiff.pairs for k in pair["shapes"]]
     assert {shape.name for shape in shapes}.isdisjoint({"ball"})
-    assert len(t["flight_link"]) == 0  # nothing is left that bounces
+    assert len(t["flyer_link"]) == 0  # nothing is left that bounces
 
 
 def test_mass_is_the_player_s(full, alone, stiff):
