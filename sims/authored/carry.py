@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..model import Model
 from ..reference.reference import Reference
+from .breath import Breath
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import place_palm
 
@@ -16,7 +16,20 @@ STANCE = Dribble(
     pelvis_height=0.875,
     pelvis_back=0.03,
     lean=(6.0, 7.0, 6.0),
-    give=0.004,
+    pelvis_left=0.0,
+    tilt=0.0,
+    breath=Breath(
+        up=(0.008, 0.5),
+        forward=(0.004, 0.0),
+        left=(0.020, 0.45),
+        pelvis=(1.0, 0.5),
+        torso=(1.0, 0.0),
+        yaw=(12.0, 0.5),
+        roll=(-2.0, 0.45),
+        head=(0.8, 0.5),
+        face=(8.0, 0.55),
+        shoulders=(2.5, 0.5),
+    ),
     feet=((0.02, 0.16, 12.0), (0.02, -0.16, -12.0)),
 )
 
@@ -43,13 +56,9 @@ def carry(model: Model, style: Carry = Carry()) -> tuple[Reference, np.ndarray, 
     steps = round(style.period / model.timestep)
     phase = 2.0 * np.pi * np.arange(steps + 1) / steps
     joint_q = np.tile(fingers(model, 0.6, "lr"), (steps + 1, 1))
-    trunk(model, joint_q, style.stance, 2.0 * phase)
-    side = np.sin(phase)
-    for joint, share in (("lower_back", 0.25), ("torso", 0.35), ("neck", -0.2)):
-        turn = Rotation.from_euler("z", (share * np.radians(style.yaw) * side)[:, None])
-        place = model.q_slice(joint)
-        joint_q[:, place] = (turn * Rotation.from_quat(joint_q[:, place])).as_quat()
+    trunk(model, joint_q, style.stance, phase / np.pi, sideways=0.5)
     legs(model, joint_q, style.stance)
+    side = np.sin(phase)
     yaw = np.radians(style.yaw) * side
     ball = np.column_stack(
         [style.reach - 0.04 * side**2, style.swing * side, style.height + style.rise * side**2]

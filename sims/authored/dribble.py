@@ -3,8 +3,8 @@ every time.
 
 The ball comes first: it falls from the hand, bounces by the law of restitution, meets the hand
 again, and is carried up and pushed down so that it leaves as it did a cycle before. The hand stays
-on the ball while it has it. The rest of the body stands, leans, looks ahead and gives a little with
-every push; arms and legs are solved for hands and feet.
+on the ball while it has it. The rest of the body stands, leans, looks ahead and goes along with every push
+(`breath`); arms and legs are solved for hands and feet.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ from scipy.spatial.transform import Rotation
 from ..ball.flight import GRAVITY, Bounce, T
 from ..model import Model, pose
 from ..reference.reference import Reference, resample_q
+from .breath import BREATH, Breath, Swing, swing
 
 Heights = Callable[[np.ndarray], np.ndarray]
 HAND_YAW = np.radians(18.0)
 """Of the fingers on the ball, from straight ahead toward the left."""
+FREE_ARM = (-14.0, 60.0)
+"""[degrees] forward of the free upper arm, bend of its elbow; CMU 06_10 and 06_12 have -31 and 55."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +42,16 @@ class Dribble:
     restitution: float = 0.8
     lowest_palm: float = 0.755
     """The hand follows through to here before it rises to meet the ball."""
-    ball_place: tuple[float, float] = (0.34, -0.27)
+    ball_place: tuple[float, float] = (0.35, -0.28)
     """Forward and left of the middle between the feet."""
     pelvis_height: float = 0.84
     pelvis_back: float = 0.07
-    give: float = 0.008
-    """Amplitude of the pelvis' bob."""
+    pelvis_left: float = -0.01
+    breath: Breath = BREATH
     lean: tuple[float, float, float] = (12.0, 12.0, 11.0)
     """Forward bend of pelvis, lower back and torso."""
+    tilt: float = 4.0
+    """Of the torso to the right, toward the ball."""
     gaze: float = 12.0
     """Below the horizon."""
     feet: tuple[tuple[float, float, float], ...] = ((0.09, 0.15, 12.0), (-0.09, -0.15, -14.0))
@@ -86,12 +91,10 @@ def dribble_right(model: Model, style: Dribble = Dribble()) -> AuthoredClip:
     style = replace(style, period=period)
     radius = model.ball_radius
     flight, ball_height, palm_height = stroke(style, radius)
-    phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
-
     joint_q = np.tile(fingers(model, style.curl), (steps + 1, 1))
-    trunk(model, joint_q, style, phase)
+    trunk(model, joint_q, style, times / period)
     legs(model, joint_q, style)
-    _left_arm(model, joint_q, phase)
+    _left_arm(model, joint_q, style.breath, times / period)
     under = np.tile([*style.ball_place, -radius], (steps + 1, 1))
     under[:, 2] += palm_height(times % period)
     snap = np.sin(np.pi * np.minimum(times % period / flight, 1.0) ** 0.7) ** 2
@@ -186,21 +189,45 @@ def fingers(model: Model, curl: float, sides: str = "r") -> np.ndarray:
     return joint_q
 
 
-def trunk(model: Model, joint_q: np.ndarray, style: Dribble, phase: np.ndarray) -> None:
-    """Pelvis, back and neck: the lean, and what goes with the push at `phase` (frames,) [rad]."""
+def trunk(
+    model: Model, joint_q: np.ndarray, style: Dribble, turns: np.ndarray, sideways: float = 1.0
+) -> None:
+    """Root, back, neck and collar bones: the lean, and what goes along with the push.
+
+    turns: (frames,) cycles since the ball left the hand; sideways: swings to the sides a cycle, a half where
+    the hands take turns.
+    """
+    breath = style.breath
+
+    def aside(one: Swing) -> np.ndarray:
+        return swing(one, turns, sideways)
+
     root = model.q_slice(model.root)
-    joint_q[:, root.start] = -style.pelvis_back + 0.004 * np.cos(phase)
-    joint_q[:, root.start + 1] = -0.01
-    joint_q[:, root.start + 2] = style.pelvis_height + style.give * np.cos(phase)
-    sway = 1.2 * np.cos(phase - 0.5)
-    for place, bend, yaw in (
-        (slice(root.start + 3, root.stop), style.lean[0], 1.0),
-        (model.q_slice("lower_back"), style.lean[1], 1.5),
-        (model.q_slice("torso"), style.lean[2], 1.5),
-        (model.q_slice("neck"), style.gaze - sum(style.lean), -4.0),
+    joint_q[:, root.start] = -style.pelvis_back + swing(breath.forward, turns)
+    joint_q[:, root.start + 1] = style.pelvis_left + aside(breath.left)
+    joint_q[:, root.start + 2] = style.pelvis_height + swing(breath.up, turns)
+    yaw, roll = aside(breath.yaw), style.tilt + aside(breath.roll)
+    hips, bent = swing(breath.pelvis, turns), swing(breath.torso, turns) - swing(breath.pelvis, turns)
+    below = Rotation.identity()
+    for place, lean, pitch, share in (
+        (slice(root.start + 3, root.stop), style.lean[0], hips, 0.2),
+        (model.q_slice("lower_back"), style.lean[1], 0.5 * bent, 0.4),
+        (model.q_slice("torso"), style.lean[2], 0.5 * bent, 0.4),
     ):
-        angles = np.column_stack([yaw * np.sin(phase) - 1.0 * yaw, bend - sway, 0.0 * phase])
-        joint_q[:, place] = Rotation.from_euler("ZYX", angles, degrees=True).as_quat()
+        turn = _turn(share * yaw, lean + pitch, share * roll)
+        joint_q[:, place] = turn.as_quat()
+        below = below * turn
+    head = _turn(aside(breath.face), style.gaze + swing(breath.head, turns), 0.0 * turns)
+    joint_q[:, model.q_slice("neck")] = (below.inv() * head).as_quat()
+    for side, up in (("l", 1.0), ("r", -1.0)):
+        joint_q[:, model.q_slice(f"{side}_clavicle")] = _turn(
+            0.0 * turns, 0.0 * turns, up * swing(breath.shoulders, turns)
+        ).as_quat()
+
+
+def _turn(yaw: np.ndarray, pitch: np.ndarray, roll: np.ndarray) -> Rotation:
+    """Left, down and right side down [degrees], in turn."""
+    return Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll]), degrees=True)
 
 
 def legs(model: Model, joint_q: np.ndarray, style: Dribble) -> None:
@@ -213,19 +240,19 @@ def legs(model: Model, joint_q: np.ndarray, style: Dribble) -> None:
         pose.place_limb(model, joint_q, f"{side}_knee", ankle, foot, knee_axis)
 
 
-def _left_arm(model: Model, joint_q: np.ndarray, phase: np.ndarray) -> None:
-    """Hangs beside the body, half bent in front, swinging a little against the push."""
+def _left_arm(model: Model, joint_q: np.ndarray, breath: Breath, turns: np.ndarray) -> None:
+    """Hangs beside the body, elbow behind it and hand in front, swinging against the push."""
     upper, lower, _ = pose.limb_bodies(model, "l_elbow")
     zero = model.zero_pose[:, :3]
-    swing = np.radians(3.0) * np.sin(phase)
-    down = np.column_stack([np.sin(0.12 + swing), np.full_like(phase, 0.24), -np.cos(0.12 + swing)])
-    inward = np.tile([0.35, -1.0, 0.0], (len(phase), 1))
+    ahead = np.radians(FREE_ARM[0] + swing(breath.arm, turns))
+    down = np.column_stack([np.sin(ahead), np.full_like(ahead, 0.24), -np.cos(ahead)])
+    inward = np.tile([0.35, -1.0, 0.0], (len(turns), 1))
     own = pose.frame_of(zero[lower] - zero[upper], model.joint_axis("l_elbow"))
     above = int(model.body_parent[upper])
     parent = pose.forward(model, joint_q, [above])[:, above, 3:]
     turn = Rotation.from_quat(parent).inv() * pose.frame_of(down, inward) * own.inv()
     joint_q[:, model.q_slice("l_shoulder")] = turn.as_quat()
-    joint_q[:, model.q_slice("l_elbow")] = np.radians(50.0) + swing[:, None]
+    joint_q[:, model.q_slice("l_elbow")] = np.radians(FREE_ARM[1] + swing(breath.elbow, turns))[:, None]
 
 
 def _right_arm(

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.spatial.transform import Rotation
 
 from ..model import Model
 from ..reference.mirror import mirrored
 from ..reference.reference import Reference
+from .breath import Breath
 from .dribble import Dribble, Heights, fingers, legs, stroke, trunk
 from .palm import place_palm, shift
 
@@ -26,6 +26,9 @@ STANCE = Dribble(
     pelvis_height=0.82,
     pelvis_back=0.09,
     lean=(16.0, 16.0, 14.0),
+    pelvis_left=0.0,
+    tilt=0.0,
+    breath=Breath(up=(0.030, 0.60), pelvis=(3.0, 0.65), left=(0.010, 0.25)),
     feet=((0.0, 0.20, 16.0), (0.0, -0.20, -16.0)),
 )
 
@@ -56,9 +59,7 @@ def switch(model: Model, style: Switch = Switch()) -> tuple[Reference, np.ndarra
     ball[:, 2] = height(times % period)
 
     joint_q = np.tile(fingers(model, 1.0, "lr"), (len(times), 1))
-    phase = 2.0 * np.pi * (times - flight - 0.45 * (period - flight)) / period
-    trunk(model, joint_q, stance, phase)
-    _level(model, joint_q)
+    trunk(model, joint_q, stance, times / period, sideways=0.5)
     legs(model, joint_q, stance)
     late = 2.0 * period - (period - flight)  # the right hand has the ball from here to the end
     centre, normal = _right_palm(style, times, ball, palm, period, flight, late, radius)
@@ -116,11 +117,3 @@ def _right_palm(
     lean = 0.30 + 0.0 * times
     normal = np.column_stack([0.05 + 0.0 * times, lean, -1.0 + 0.0 * times])
     return centre, normal
-
-
-def _level(model: Model, joint_q: np.ndarray) -> None:
-    """Take the turn to one side out of the trunk, in place: both halves of the cycle are alike."""
-    joint_q[:, 1] = 0.0
-    for place in (slice(3, 7), *(model.q_slice(j) for j in ("lower_back", "torso", "neck"))):
-        pitch = Rotation.from_quat(joint_q[:, place]).as_euler("ZYX")[:, 1:2]
-        joint_q[:, place] = Rotation.from_euler("y", pitch).as_quat()

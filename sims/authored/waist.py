@@ -14,6 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from ..model import Model
 from ..reference.reference import Reference
+from .breath import Breath
 from .dribble import Dribble, fingers, legs, trunk
 from .palm import MIRROR, place_palm
 
@@ -21,7 +22,20 @@ STANCE = Dribble(
     pelvis_height=0.885,
     pelvis_back=0.02,
     lean=(3.0, 4.0, 4.0),
-    give=0.0,
+    pelvis_left=0.0,
+    tilt=0.0,
+    breath=Breath(
+        up=(0.010, 0.0),
+        forward=(0.012, 0.5),
+        left=(0.018, 0.75),
+        pelvis=(1.5, 0.0),
+        torso=(3.5, 0.0),
+        yaw=(3.0, 0.80),
+        roll=(2.0, 0.25),
+        head=(1.5, 0.0),
+        face=(3.0, 0.15),
+        shoulders=(2.5, 0.0),
+    ),
     feet=((0.0, 0.17, 14.0), (0.0, -0.17, -14.0)),
     gaze=8.0,
 )
@@ -41,8 +55,6 @@ class Waist:
     """[s] around the front and the back in which both hands have the ball."""
     aside: float = 0.05
     """An empty hand keeps this much farther out."""
-    sway: float = 0.012
-    """The hips give way to the ball."""
     palm: dict[str, tuple[np.ndarray, np.ndarray]] = field(
         default_factory=lambda: {
             "normal": (np.array([-0.25, 1.0, 0.45]), np.array([0.35, 1.0, 0.5])),
@@ -63,9 +75,7 @@ def waist(model: Model, style: Waist = Waist()) -> tuple[Reference, np.ndarray, 
     period, radius = steps * model.timestep, model.ball_radius
     angle = 2.0 * np.pi * times / period
     joint_q = np.tile(fingers(model, 0.7, "lr"), (steps + 1, 1))
-    trunk(model, joint_q, style.stance, 2.0 * angle)
-    joint_q[:, 0] -= style.sway * np.cos(angle)
-    joint_q[:, 1] -= style.sway * np.sin(angle)
+    trunk(model, joint_q, style.stance, times / period)
     legs(model, joint_q, style.stance)
     ball, _ = _oval(style, angle)
     touch = np.zeros((steps + 1, 2), bool)

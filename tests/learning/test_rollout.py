@@ -301,7 +301,7 @@ def test_the_open_loop_is_stepping_along_the_targets(player, dribble):
         for row in range(STEPS):
             by_hand.set_targets(graph.targets[fragment.k * STEPS + row])
             by_hand.step()
-        np.testing.assert_allclose(task.sim.joint_q, by_hand.joint_q, atol=1e-4)
+        np.testing.assert_allclose(task.sim.joint_q, by_hand.joint_q, atol=3e-4)
     assert (fragment.k == graph.count - 1).all() and (rollout.k == graph.count - 1).all()
 
 

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from warpdribble.learning.starts import Starts, reference_starts
 from warpdribble.learning.tasks.locomotion import FALLEN, HEIGHT_UNIT, UNITS, CostWeights
 from warpdribble.sims.model import pose
+from warpdribble.sims.planar import heading
 
 
 def put(worlds, joint_q, joint_qd=None):
@@ -44,7 +45,8 @@ def test_what_a_policy_feels(task, graph, player):
     worlds, k = task(3), np.zeros(3, int)
     q, qd = (np.tile(x[0], (3, 1)) for x in (graph.start_q, graph.start_qd))
     q[0, 2] += UNITS["height"]
-    qd[1, 0] += UNITS["com_velocity"]
+    ahead = Rotation.from_euler("z", heading(q[1, 3:7])).apply([1.0, 0.0, 0.0])
+    qd[1, :3] += UNITS["com_velocity"] * ahead
     q[2, player.q_slice("l_knee")] += 0.2
     worlds.reset(Starts(k, q, qd))
     felt, columns = worlds.observe(k), worlds.columns

@@ -98,6 +98,7 @@ def test_changing_hands_is_its_own_mirror_image(player):
     joint_q = authored_clip(player, "switch_hands").reference.joint_q
     reference = authored_clip(player, "switch_hands").reference
     twin = shift(mirrored(player, reference).joint_q, len(joint_q) // 2)
-    arms = [player.q_slice(f"{s}_{j}") for s in "lr" for j in ("shoulder", "elbow", "wrist")]
-    for place in arms:
-        assert np.allclose(twin[:, place], joint_q[:, place], atol=1e-6)
+    assert np.allclose(twin[:, 1:3], joint_q[:, 1:3], atol=1e-6)
+    for joint in player.joints:
+        if joint.kind != "free":
+            assert np.allclose(twin[:, joint.q], joint_q[:, joint.q], atol=1e-6), joint.name
