@@ -78,7 +78,7 @@ JOINTS = {  # type, range [rad], kp [N m/rad], kv [N m s/rad], effort limit [N m
     "hip": ("ball", (0, 2.2), 500, 50, 400, 0.02),
     "knee": ("hinge", (-0.09, 2.44), 500, 50, 400, 0.02),
     "ankle": ("ball", (0, 0.9), 800, 80, 400, 0.02),
-    "toes": ("hinge", (-1.22, 0.79), 10, 1, 10, 0.002),
+    "toes": ("hinge", (-1.22, 0.79), 50, 5, 50, 0.002),
     "mcp": ("ball", (0, 1.7), 5, 0.2, 5, 1e-4),
     "pip": ("hinge", (-0.09, 1.83), 2, 0.1, 2, 5e-5),
     "dip": ("hinge", (-0.09, 1.57), 2, 0.1, 2, 2e-5),
@@ -122,6 +122,12 @@ KEYFRAMES: dict[str, tuple[Hand, dict[str, Any]]] = {
     "fist": (closed(1.0), {}),
     "hold": (closed(0.2), HOLD),
 }
+
+# A shoe and the pad of a heel give way: a point of the sole is a spring [N/m] and a damper [N s/m],
+# of the order of a shod heel's 100 kN/m (Aerts & De Clercq 1993, J. Sports Sci. 11). On a rigid sole a
+# runner lands with a blow of 4 to 7 body weights within one step, which throws the foot up again.
+SOLE = (80e3, 535.0)
+TIMESTEP, GROUND_ERP, GROUND_CFM = 0.01, 0.2, 1e-5
 
 BALL_RADIUS, BALL_MASS, BALL_XY = 0.1193, 0.6237, (0.35, -0.35)
 MIRROR = np.array([1, -1, 1])
@@ -350,6 +356,14 @@ def add(parent: ET.Element, tag: str, attributes: dict[str, Any] | None = None, 
     return ET.SubElement(parent, tag, {k: v if isinstance(v, str) else text(v) for k, v in items})
 
 
+def sole() -> tuple[float, float, float]:
+    """Restitution, erp [-] and cfm [s/kg] of a shoe that make SOLE of a contact with the ground, which
+    has the mean of both geoms' (Smith 2006, ODE user guide 3.8)."""
+    spring, damper = SOLE
+    load = TIMESTEP * spring + damper
+    return 0.0, 2.0 * TIMESTEP * spring / load - GROUND_ERP, 2.0 / load - GROUND_CFM
+
+
 def mjcf() -> str:
     """The player, the ball and the ground as MJCF."""
     root = ET.Element("mujoco", model="warpdribble player")
@@ -360,14 +374,16 @@ def mjcf() -> str:
     ))  # fmt: skip
     add(root, "compiler", angle="radian", autolimits="true")
     # MuJoCo's default integrator would treat the drives' damping explicitly and blow up
-    add(root, "option", timestep=0.01, gravity=(0, 0, -9.81), integrator="implicitfast")
+    add(root, "option", timestep=TIMESTEP, gravity=(0, 0, -9.81), integrator="implicitfast")
     add(root, "size", nuser_geom=3)
     default = add(root, "default")
     add(default, "geom", contype=0, conaffinity=1, condim=3, friction=(0.8, 0.005, 1e-4),
-        user="0 0.2 1e-5")  # fmt: skip
+        user=(0, GROUND_ERP, GROUND_CFM))  # fmt: skip
     add(default, "site", size=0.003, group=3)
     for name, rgba in COLOURS.items():
-        add(add(default, "default", {"class": name}), "geom", rgba=rgba)
+        geom = add(add(default, "default", {"class": name}), "geom", rgba=rgba)
+        if name == "shoe":
+            geom.set("user", text(sole()))
     for name, (kind, limits, kp, kv, effort, armature) in JOINTS.items():
         group = add(default, "default", {"class": name})
         add(group, "joint", type=kind, range=limits, armature=armature)
@@ -376,7 +392,7 @@ def mjcf() -> str:
     world, actuator = add(root, "worldbody"), add(root, "actuator")
     add(world, "light", pos=(0, 0, 4), directional="true")
     add(world, "geom", name="ground", type="plane", size=(0, 0, 0.05), contype=1, conaffinity=0,
-        rgba="0.76 0.60 0.42 1", user="1 0.2 1e-5")  # fmt: skip
+        rgba="0.76 0.60 0.42 1", user=(1, GROUND_ERP, GROUND_CFM))  # fmt: skip
     player, elements, at = bodies(), {"": world}, {"": vec(0, 0, 0)}
     for b in player:
         element = add(elements[b.parent], "body", name=b.name, pos=b.at - at[b.parent])
