@@ -38,6 +38,7 @@ FROM_COM = wp.constant(9)
 MISS = wp.constant(10)
 BALLISTIC = wp.constant(11)
 STATUS = wp.constant(12)
+FACING = wp.constant(13)
 
 
 @wp.struct
@@ -243,6 +244,10 @@ def observe(
             v = spot_velocity(world, g, a, p)
             v = Vec3(v.x, v.y, v.z + 0.5 * tree.h * tree.gravity[2])  # the parabola's own, see `bounce`
             ballistic(probe, -tree.gravity[2], R, x - at, v, x.z, k, out, g, c)
+        elif kind == FACING:
+            ahead = facing(R, Vec3(fill(1.0), fill(0.0), fill(0.0)))
+            give(out, g, c, ahead.x)
+            give(out, g, c + 1, neg(ahead.y))
         elif kind == STATUS:
             give(out, g, c, flags(world, g))
         else:

@@ -52,3 +52,16 @@ def over_ground(poses: ArrayLike, pivot: np.ndarray, place: np.ndarray, turn: fl
         by = Rotation.from_rotvec([0.0, 0.0, turn])
         poses[:, 3:] = (by * Rotation.from_quat(poses[:, 3:])).as_quat()
     return poses
+
+
+def turned(
+    joint_q: np.ndarray, joint_qd: np.ndarray, by: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """States (n, nq) and (n, nv) whose first joint is free, each turned by an angle (n,) [rad] about the
+    vertical, and put at a place (n, 2) [m] on the ground."""
+    joint_q, joint_qd = np.array(joint_q, float), np.array(joint_qd, float)
+    turn = Rotation.from_rotvec(np.multiply.outer(by, [0.0, 0.0, 1.0]))
+    joint_q[:, :2] = place
+    joint_q[:, 3:7] = (turn * Rotation.from_quat(joint_q[:, 3:7])).as_quat()
+    joint_qd[:, :3] = turn.apply(joint_qd[:, :3])
+    return joint_q, joint_qd

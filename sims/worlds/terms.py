@@ -39,6 +39,12 @@ def spin() -> Term:
     return Term("SPIN", 3)
 
 
+def facing() -> Term:
+    """(2) cosine and sine of the way that the root's first axis points over the ground: the one observation
+    that says where a character stands to the world."""
+    return Term("FACING", 2)
+
+
 def com() -> Term:
     """(3) centre of mass of the root's tree, from the ground below the root [m]."""
     return Term("COM", 3)

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from warpdribble.sims.planar import composed, heading, over_ground, planar, relative, rotation, wrapped
+from warpdribble.sims.planar import (
+    composed,
+    heading,
+    over_ground,
+    planar,
+    relative,
+    rotation,
+    turned,
+    wrapped,
+)
 
 number = st.floats(-100, 100)
 triples = st.integers(1, 4).flatmap(
@@ -112,3 +121,19 @@ def test_over_ground(point, pivot, place, turn):
 def test_rotation(angle):
     way = rotation(angle) @ [2.0, -1.0]
     assert complex(*way) == pytest.approx((2 - 1j) * np.exp(1j * angle))
+
+
+def test_states_turned_move_as_before():
+    """Turned to and fro, they are as they were; a player that runs ahead still does, and spins as fast."""
+    random = np.random.default_rng(0)
+    q, qd, by = random.normal(size=(5, 9)), random.normal(size=(5, 8)), random.uniform(-4, 4, 5)
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    there = turned(q, qd, by, np.ones((5, 2)))
+    assert_same(np.c_[np.ones((5, 2)), heading(q[:, 3:7]) + by], planar(there[0]))
+    before, after = (Rotation.from_quat(x[:, 3:7]).inv().apply(v[:, :3]) for x, v in ((q, qd), there))
+    np.testing.assert_allclose(after, before, atol=EXACT)
+    np.testing.assert_array_equal(there[1][:, 3:], qd[:, 3:])
+    np.testing.assert_array_equal(there[0][:, 7:], q[:, 7:])
+    back = turned(*there, -by, q[:, :2])
+    np.testing.assert_allclose(np.abs(np.sum(back[0][:, 3:7] * q[:, 3:7], axis=1)), 1.0, atol=EXACT)
+    np.testing.assert_allclose(back[1], qd, atol=EXACT)
