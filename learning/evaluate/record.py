@@ -30,13 +30,15 @@ def record(
     progress: Callable[[int], object] | None = None,
 ) -> list[Trajectory]:
     """Let all worlds of a task go through so many fragments, each from its state of `starts`; what some of
-    them did, with their references, which walk on from where they began. progress: called with the
+    them did, with their references, which walk on from the place where they began. progress: called with the
     fragments done. A world whose state has become non-finite is left out."""
     sim, graph, model, chosen = task.sim, task.graph, task.model, list(worlds)
     rollout = Rollout(task, controller, chooser or Ahead(), starts, disturber)
     joint_q, body_q = [sim.joint_q[chosen]], [sim.body_q[chosen]]
     wanted: list[np.ndarray] = []
-    at, spent, began = planar(starts.joint_q[chosen]), 0.0, time.perf_counter()
+    begins = graph.start_q[starts.k[chosen]]
+    at = np.concatenate([starts.joint_q[chosen, :2], planar(begins)[:, 2:]], axis=1)
+    spent, began = 0.0, time.perf_counter()
     for step in rollout.steps(fragments):
         spent += time.perf_counter() - began
         joint_q.append(sim.joint_q[chosen])

@@ -14,6 +14,9 @@ from ..starts import Starts, Streams
 from ..tasks.disturbance import CALM, Disturbance, Disturber
 from ..tasks.locomotion import Locomotion
 
+PLACE = 0.2
+"""[m] A cycle that leads no farther has no pace."""
+
 
 @dataclass
 class Trials:
@@ -34,6 +37,12 @@ class Trials:
     cycle was completed"""
     turn: float
     """[rad] mean difference per cycle of its turn"""
+    pace: float
+    """mean share of the reference's way over the ground that a cycle covers, along it; NaN where the
+    reference stays within PLACE in a cycle"""
+    astray: float
+    """[rad] 95th percentile, over the trials that survive, of how far each faces away from the reference's
+    heading at worst; NaN for none"""
 
 
 def run_trials(
@@ -65,7 +74,7 @@ def run_trials(
             progress(fragment.row + 1)
     task.calm()
     mean = float(cost / life.sum()) if life.any() else np.nan
-    return Trials(stands, life / fragments, mean, *errors.means())
+    return Trials(stands, life / fragments, mean, *errors.means(), errors.astray(stands))
 
 
 def record_starts(
@@ -90,7 +99,7 @@ def record_starts(
         stands &= ~fragment.failed
         if settled <= fragment.row + 1 < rows and (fragment.row + 1) % every == 0:
             k = rollout.chooser.next(task.graph, fragment.k)
-            seen.append(Starts(k, task.sim.joint_q, task.sim.joint_qd))
+            seen.append(task.states(k))
     if not stands.any():
         return starts
     return Starts.joined([Starts(s.k[stands], s.joint_q[stands], s.joint_qd[stands]) for s in seen])
@@ -101,8 +110,9 @@ class Errors:
 
     def __init__(self, task: Locomotion, start: Starts):
         self.task, self.row = task, 0
-        self.sums = np.zeros(4)
-        self.counts = np.zeros(4)
+        self.sums = np.zeros(5)
+        self.counts = np.zeros(5)
+        self.worst = np.zeros(task.worlds)
         graph = task.graph
         self.ways = relative(planar(graph.start_q), planar(graph.goal_q))
         self.begun = planar(start.joint_q)
@@ -115,6 +125,7 @@ class Errors:
         ends = np.linalg.norm(off, axis=-1).mean(axis=0)
         self._sum(0, task.felt[stands, columns["miss"].start])
         self._sum(1, ends[stands])
+        self.worst = np.maximum(self.worst, np.abs(task.astray))
         self.row += 1
         self.way = composed(self.way, self.ways[k])
         if self.row % task.graph.cycle == 0:
@@ -122,13 +133,23 @@ class Errors:
             gone = relative(self.begun, now)[stands]
             self._sum(2, np.linalg.norm(gone[:, :2] - self.way[stands, :2], axis=1))
             self._sum(3, np.abs(wrapped(gone[:, 2] - self.way[stands, 2])))
+            way = self.way[stands, :2]
+            far = np.linalg.norm(way, axis=1) > PLACE
+            self._sum(4, np.sum(gone[far, :2] * way[far], axis=1) / np.sum(way[far] ** 2, axis=1))
             self.begun, self.way = now, np.zeros_like(self.way)
 
     def _sum(self, which: int, values: np.ndarray) -> None:
         self.sums[which] += values.sum()
         self.counts[which] += len(values)
 
-    def means(self) -> tuple[float, float, float, float]:
-        """Of the angle [rad], the ends [m], the drift [m] and the turn [rad]; NaN for none."""
-        angle, ends, drift, turn = (float(s / c) if c else np.nan for s, c in zip(self.sums, self.counts))
-        return angle, ends, drift, turn
+    def means(self) -> tuple[float, float, float, float, float]:
+        """Of the angle [rad], the ends [m], the drift [m], the turn [rad] and the pace; NaN for none."""
+        angle, ends, drift, turn, pace = (
+            float(s / c) if c else np.nan for s, c in zip(self.sums, self.counts)
+        )
+        return angle, ends, drift, turn, pace
+
+    def astray(self, stands: np.ndarray) -> float:
+        """[rad] 95th percentile over those of a mask (worlds,) of how far each went astray at worst; NaN for
+        none."""
+        return float(np.quantile(self.worst[stands], 0.95)) if stands.any() else np.nan

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from ...sims.errors import InputError
 from ..choose import RandomWalk
 from ..evaluate.trials import Trials, record_starts, run_trials
 from ..policies.linear import Explore, LinearPolicy
@@ -27,7 +28,7 @@ from ..rollout import Rollout
 from ..runs.stage import Context, Report, Stage
 from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
-from ..tasks.locomotion import WEIGHTS, CostWeights, Locomotion, locomotion_model
+from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, locomotion_model
 from ..workers import Workers, shares
 
 RECORD_EVERY = 5
@@ -54,9 +55,9 @@ class SamconConfig:
     """fragments of a walk"""
     lag: int = 12
     """fragments after which descendants are counted"""
-    sigma: float = 0.2
+    sigma: float = 0.12
     """[rad] exploration at first"""
-    least_sigma: float = 0.08
+    least_sigma: float = 0.06
     """[rad] and at least"""
     open_loop: int = 2
     """iterations at first that learn offsets a_hat only"""
@@ -167,7 +168,7 @@ def explore(
         if row % RECORD_EVERY == RECORD_EVERY - 1:
             best = home[:, 0] + np.argmin(np.take_along_axis(cost, parent, axis=1), axis=1)
             after = rollout.chooser.next(task.graph, fragment.k)[best]
-            states.append((row, Starts(after, task.sim.joint_q[best], task.sim.joint_qd[best])))
+            states.append((row, task.states(after, best)))
     return [
         _island(config, task.graph.count, S[:, i], A[:, i], k[:, i], E[:, i], parents[:, i], _own(states, i))
         for i in range(islands)
@@ -447,11 +448,22 @@ def locomotion_task(context: Context, worlds: int) -> Locomotion:
     )
 
 
+def learned(context: Context, arrays: dict[str, np.ndarray]) -> LinearPolicy:
+    """The policy in a result. Raises InputError for one of a task that steers or feels something else."""
+    policy = LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy)))
+    if policy.M.shape[1:] != (STEERED, FELT):
+        reason = (
+            f"an older version learned it: it feels {policy.M.shape[2]} numbers, not {FELT}; learn it anew"
+        )
+        raise InputError(reason, "", "out")
+    return policy
+
+
 STAGE = Stage(
     name="locomotion",
     about="to stay up and follow the motion, without the ball",
     config=SamconConfig,
     make=make,
-    controller=lambda context, arrays: LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy))),
+    controller=learned,
     task=locomotion_task,
 )

@@ -38,7 +38,7 @@ def said_if_damaged(path: Path, remedy: str, hint: str = "") -> Iterator[None]:
     """Turn whatever reading a damaged file raises into an InputError of one line with the remedy."""
     try:
         yield
-    except (FileNotFoundError, PermissionError):
+    except (FileNotFoundError, PermissionError, InputError):
         raise
     except (
         zipfile.BadZipFile,

@@ -9,19 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...sims.model import Model
+from ...sims.planar import heading, turned, wrapped
 from ...sims.worlds import FALL, NONFINITE, Group, Probe, terms
 from ..graph import STEPS, ControlGraph
 from ..starts import Starts
 from .follow import Follow
 
+STEERED, FELT = 17, 20
+"""Numbers that a policy changes, and that it feels, on the player."""
 FINGERS = ("*_mcp", "*_pip", "*_dip")
 FALLEN = 0.3
 """[m] A root this far below, or above, the reference's is out of control."""
 HEIGHT_UNIT = 1.6
 """[m] of the balance cost"""
 UNITS = {"lean": 0.1, "height": 0.05, "com": 0.05, "com_velocity": 0.3, "momentum": 3.0}
-FOOT_UNIT = 0.05
-"""Deviations that count as one in the 18-number reduced state: of the parts above and of both feet."""
+FOOT_UNIT, TURN_UNIT, HEADING_UNIT = 0.05, 1.0, 0.2
+"""Deviations that count as one in the state: of the parts above, of both feet, of the turning speed, of the
+heading."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +40,10 @@ class CostWeights:
     """of the mean height of feet and head [m]"""
     balance: float = 10.0
     """of where the centre of mass is over feet and head [1.6 m]"""
-    travel: float = 3.0
+    travel: float = 6.0
     """of its velocity [m/s]"""
+    heading: float = 5.0
+    """of the way it faces [rad]"""
 
 
 WEIGHTS = CostWeights()
@@ -51,8 +57,12 @@ def locomotion_model() -> Model:
 class Locomotion(Follow):
     """A player that keeps its balance along a control graph.
 
-    A policy offsets the lower back, hips and knees, 11 numbers; shoulders, elbows and wrists are another's,
-    here a disturbance's. It feels the 18 numbers of `observe`.
+    A policy offsets the lower back, hips, knees and ankles, 17 numbers; shoulders, elbows and wrists are
+    another's, here a disturbance's. It feels the 20 numbers of `observe`.
+
+    Where it is on the ground is not felt, but which way it faces is: each world keeps the heading that the
+    reference would have, had it gone the same fragments. A state to start from is seen from where the
+    reference begins the fragment, so its heading says how far it is off.
     """
 
     def __init__(
@@ -66,7 +76,7 @@ class Locomotion(Follow):
     ):
         roles = model.roles
         hips, knees, ankles, toes = (roles.both(part) for part in ("hips", "knees", "ankles", "toes"))
-        steered = (roles.spine[0], *hips, *knees)
+        steered = (roles.spine[0], *hips, *knees, *ankles)
         arms = (*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists"))
         pushed = (roles.one("trunk"), *roles.both("hands"))
         super().__init__(model, graph, worlds, device, threads, (*steered, *arms), pushed)
@@ -85,7 +95,15 @@ class Locomotion(Follow):
         self.scale = np.concatenate(
             [np.full(_count(self.columns[name]), unit) for name, unit in units.items()]
         )
-        self.obs = len(self.scale)
+        spin = self.columns["spin"]
+        self._felt = [*range(len(self.scale)), spin.stop - 1]
+        self.scale = np.append(self.scale, TURN_UNIT)
+        self.obs = len(self.scale) + 1
+        self._heading = weights.heading
+        self.begins = heading(graph.start_q[:, 3:7])
+        self._turns = wrapped(heading(graph.goal_q[:, 3:7]) - self.begins)
+        self.heading = np.zeros(worlds)
+        """(worlds,) [rad] that each world should face"""
         self.start = self._reference(graph.start_q, graph.start_qd)
         self.goal = self._reference(graph.goal_q, graph.goal_qd)
         self.goal[:, self.columns["miss"]] = 0.0
@@ -105,15 +123,26 @@ class Locomotion(Follow):
 
     def reset(self, starts: Starts, which: np.ndarray | None = None) -> None:
         super().reset(starts, which)
+        which = np.ones(self.worlds, bool) if which is None else which
+        self.heading = np.array(self.heading)
+        self.heading[which] = self.begins[starts.k]
         self._feel(0)
 
     def observe(self, k: np.ndarray) -> np.ndarray:
-        """Reduced state s (worlds, 18): the deviation from the reference at the start of fragments k."""
-        return np.asarray((self.felt[:, : self.obs] - self.start[k, : self.obs]) / self.scale)
+        """State s (worlds, 20): the deviation from the reference at the start of fragments k."""
+        off = (self.felt[:, self._felt] - self.start[k][:, self._felt]) / self.scale
+        return np.concatenate([off, self.astray[:, None] / HEADING_UNIT], axis=1)
+
+    @property
+    def astray(self) -> np.ndarray:
+        """(worlds,) [rad] to the left of where each world should face"""
+        cos, sin = self.felt[:, self.columns["facing"]].T
+        return np.asarray(wrapped(np.arctan2(sin, cos) - self.heading))
 
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         super().advance(k, action, first, count)
         if first + count == STEPS:
+            self.heading = wrapped(self.heading + self._turns[k])
             self._feel(k)
 
     def judge(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,11 +151,19 @@ class Locomotion(Follow):
         off = self.felt[:, self.columns["height"]][:, 0] - self.goal[k, self.columns["height"]][:, 0]
         down = self.felt[:, self.columns["status"]][:, 0].astype(int) & (FALL | NONFINITE) != 0
         failed = down | ~(np.abs(off) < FALLEN)
-        return np.where(failed, np.inf, self._cost), failed
+        cost = self._cost + self._heading * np.abs(self.astray)
+        return np.where(failed, np.inf, cost), failed
+
+    def states(self, k: np.ndarray, worlds: np.ndarray | slice = slice(None)) -> Starts:
+        """States of worlds (n,) that go on with fragments k (n,), to start from: where the reference begins
+        them, and as far off its heading as they are now."""
+        joint_q, joint_qd = self.sim.joint_q[worlds], self.sim.joint_qd[worlds]
+        by = self.begins[k] - self.heading[worlds]
+        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2]))
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)
-        self.felt = self.felt[sources]
+        self.felt, self.heading = self.felt[sources], self.heading[sources]
 
     def _feel(self, k: np.ndarray | int) -> None:
         self.felt, self._cost = self.probe.judge(k)
@@ -147,6 +184,7 @@ def _terms(ends: tuple[str, ...], judged: tuple[str, ...]) -> Mapping[str, terms
         "momentum": terms.momentum(),
         **{end: terms.point(end) for end in ends},
         "spin": terms.spin(),
+        "facing": terms.facing(),
         "miss": terms.miss(judged),
         **over,
         "status": terms.status(),

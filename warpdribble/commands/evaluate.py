@@ -97,6 +97,8 @@ class Evaluate:
             "end_error_cm": 100.0 * trials.end_error,
             "drift_cm_per_cycle": 100.0 * trials.drift,
             "turn_deg_per_cycle": math.degrees(trials.turn),
+            "pace_percent": 100.0 * trials.pace,
+            "astray_deg": math.degrees(trials.astray),
         }
         if self.pushes:
             with bar("pushes", len(FORCES)) as progress:
@@ -142,7 +144,10 @@ def _text(report: dict[str, Any]) -> list[str]:
         f"{100.0 * report['lived']:.1f} % of the time lived",
         f"tracking  joints {shown('angle_error_deg', 'degrees')}, "
         f"feet and head {shown('end_error_cm', 'cm')}, while standing",
-        f"drift     {shown('drift_cm_per_cycle', 'cm')} and {shown('turn_deg_per_cycle', 'degrees')} a cycle",
+        f"way       {shown('pace_percent', '%')} of the reference's pace, "
+        f"{shown('drift_cm_per_cycle', 'cm')} off it in a cycle",
+        f"heading   {shown('astray_deg', 'degrees')} off the reference's at worst (95 % of the trials), "
+        f"{shown('turn_deg_per_cycle', 'degrees')} in a cycle",
     ]
     return lines + (_push_text(report["pushes"]) if "pushes" in report else [])
 

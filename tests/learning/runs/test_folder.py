@@ -225,7 +225,7 @@ def test_a_checkpoint_of_another_graph_is_said(tmp_path, graph, standing):
 
     learn(tmp_path / "run", 2, SamconConfig(islands=1, particles=2, walk=2, check_every=2, trials=2))
     standing.save(tmp_path / "run" / "graph.npz")
-    said = r"checkpoint\.npz: is damaged \(policy\.M has the shape \(14, 11, 18\)\)"
+    said = r"checkpoint\.npz: is damaged \(policy\.M has the shape \(14, 17, 20\)\)"
     refused(said, "out", learn, tmp_path / "run", 3, None)
 
 

@@ -66,7 +66,7 @@ class Walker:
 
 
 def still(context, arrays):
-    return LinearPolicy.zero(context.graph.count, 11, 18)
+    return LinearPolicy.zero(context.graph.count, 17, 20)
 
 
 STAGE = Stage(

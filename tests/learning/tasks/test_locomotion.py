@@ -7,9 +7,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpdribble.learning.starts import Starts, reference_starts
-from warpdribble.learning.tasks.locomotion import FALLEN, HEIGHT_UNIT, UNITS, CostWeights
+from warpdribble.learning.tasks.locomotion import (
+    FALLEN,
+    FELT,
+    HEADING_UNIT,
+    HEIGHT_UNIT,
+    STEERED,
+    TURN_UNIT,
+    UNITS,
+    CostWeights,
+)
 from warpdribble.sims.model import pose
-from warpdribble.sims.planar import heading
+from warpdribble.sims.planar import heading, wrapped
 
 
 def put(worlds, joint_q, joint_qd=None):
@@ -19,15 +28,15 @@ def put(worlds, joint_q, joint_qd=None):
 
 
 def test_a_policy_feels_nothing_on_the_reference(task, graph):
-    """In any fragment; 18 numbers, and what it moves are 11."""
+    """In any fragment; 20 numbers, and what it moves are 17."""
     worlds, starts = task(graph.count), reference_starts(graph)
-    assert (worlds.obs, worlds.actions) == (18, 11)
+    assert (worlds.obs, worlds.actions) == (FELT, STEERED) == (20, 17)
     worlds.reset(starts)
     np.testing.assert_allclose(worlds.observe(starts.k), 0.0, atol=1e-3)
     assert np.abs(worlds.observe((starts.k + 5) % graph.count)).max() > 0.1
 
 
-def test_a_policy_feels_the_same_wherever_the_player_is_and_faces(task, graph):
+def test_a_policy_feels_only_the_heading_of_where_the_player_is_and_faces(task, graph):
     """To rounding, in units of deviation."""
     worlds, starts, random = task(graph.count), reference_starts(graph), np.random.default_rng(1)
     q, qd = starts.joint_q.copy(), starts.joint_qd.copy()
@@ -36,27 +45,54 @@ def test_a_policy_feels_the_same_wherever_the_player_is_and_faces(task, graph):
     q[:, 3:7] = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
     qd[:, :3] = turn.apply(qd[:, :3])
     worlds.reset(Starts(starts.k, q, qd))
-    np.testing.assert_allclose(worlds.observe(starts.k), 0.0, atol=5e-3)
+    felt = worlds.observe(starts.k)
+    np.testing.assert_allclose(felt[:, :-1], 0.0, atol=5e-3)
+    off = wrapped(heading(q[:, 3:7]) - heading(starts.joint_q[:, 3:7]))
+    np.testing.assert_allclose(felt[:, -1], off / HEADING_UNIT, atol=1e-4)
+
+
+def test_each_world_keeps_the_heading_of_its_reference(task, graph):
+    """Round and round a graph that turns; copies keep it, and states to start from are as far off it."""
+    turning, k = graph.goal_q.copy(), np.arange(4)
+    turning[:, 3:7] = (Rotation.from_euler("z", 0.7) * Rotation.from_quat(graph.goal_q[:, 3:7])).as_quat()
+    turns = wrapped(heading(turning[:, 3:7]) - heading(graph.start_q[:, 3:7]))
+    worlds = task(4, graph=replace(graph, goal_q=turning))
+    worlds.reset(Starts(k, graph.start_q[k], graph.start_qd[k]))
+    faces = heading(graph.start_q[k, 3:7])
+    for _ in range(12):
+        worlds.advance(k, np.zeros((4, worlds.actions)))
+        faces, k = faces + turns[k], graph.follow(k)
+        left = wrapped(heading(worlds.sim.joint_q[:, 3:7]) - faces)
+        np.testing.assert_allclose(wrapped(worlds.astray - left), 0.0, atol=1e-5)
+    kept = worlds.astray
+    worlds.become(np.array([1, 1, 3, 0]))
+    np.testing.assert_array_equal(worlds.astray, kept[[1, 1, 3, 0]])
+    again = worlds.states(graph.follow(k))
+    before = worlds.astray
+    worlds.reset(again)
+    np.testing.assert_allclose(worlds.astray, before, atol=1e-5)
 
 
 def test_what_a_policy_feels(task, graph, player):
     """Higher by 5 cm, so are the centre of mass and the feet: a unit each; faster by 0.3 m/s, another; a bent
     knee moves its foot, and hardly anything else."""
-    worlds, k = task(3), np.zeros(3, int)
-    q, qd = (np.tile(x[0], (3, 1)) for x in (graph.start_q, graph.start_qd))
+    worlds, k = task(4), np.zeros(4, int)
+    q, qd = (np.tile(x[0], (4, 1)) for x in (graph.start_q, graph.start_qd))
     q[0, 2] += UNITS["height"]
     ahead = Rotation.from_euler("z", heading(q[1, 3:7])).apply([1.0, 0.0, 0.0])
     qd[1, :3] += UNITS["com_velocity"] * ahead
     q[2, player.q_slice("l_knee")] += 0.2
+    qd[3, player.dof_slice(player.root)][3:] += Rotation.from_quat(q[3, 3:7]).inv().apply([0, 0, TURN_UNIT])
     worlds.reset(Starts(k, q, qd))
     felt, columns = worlds.observe(k), worlds.columns
     left, right = (columns[foot] for foot in player.roles.both("feet"))
-    higher, faster = np.zeros(18), np.zeros(18)
+    higher, faster = np.zeros(20), np.zeros(20)
     higher[[columns[name].stop - 1 for name in ("height", "com")]] = 1.0
     higher[[left.stop - 1, right.stop - 1]] = 1.0
     faster[columns["com_velocity"].start] = 1.0
     np.testing.assert_allclose(felt[0], higher, atol=2e-3)
     np.testing.assert_allclose(felt[1], faster, atol=5e-3)
+    assert felt[3, -2] == pytest.approx(1.0, abs=1e-4)
     assert np.linalg.norm(felt[2, left]) > 1.0
     assert np.abs(np.delete(felt[2], np.r_[left])).max() < 0.1 and not np.round(felt[2, right], 3).any()
 
@@ -72,7 +108,7 @@ def ends_of(worlds, joint_q):
     return np.stack(out, axis=1)
 
 
-ZERO = CostWeights(*[0.0] * 5)
+ZERO = CostWeights(*[0.0] * 6)
 
 
 def costs(task, joint_q, **weights):
