@@ -3,6 +3,7 @@ play the longer the luckier it starts."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -10,13 +11,14 @@ import numpy as np
 from ...sims.model import Model
 from ...sims.reference import Reference
 from ...sims.trajectory import Trajectory
-from ..graph import clip_graph
+from ..graph import ControlGraph, clip_graph
 from ..starts import Starts
 from ..tasks.follow import Follow
+from .refine import refine
 
 TRIES = 16
 """Starts of the ball; a vector unit steps as many worlds in the time of one."""
-ROOT_DRIVE = (30e3, 3e3, 6e3, 600.0)
+ROOT_DRIVE = (300e3, 30e3, 60e3, 6e3)
 """Virtual gains of a tracked root: [N/m], [N s/m], [N m/rad], [N m s/rad]. The rates are a tenth
 of the stiffnesses, as with the player's joints, so that one lead in time makes up for all their
 damping."""
@@ -31,13 +33,22 @@ def follow(
     worlds: int,
     root: Literal["free", "tracked"] = "free",
     device: str = "cpu",
+    progress: Callable[[int], object] | None = None,
 ) -> Follow:
-    """Worlds that follow a reference from its first row to its last; root "tracked": virtual forces hold the
-    root to it too."""
-    graph = clip_graph(model, reference, model.roles.feet, ROOT_DRIVE[1] / ROOT_DRIVE[0])
-    task = Follow(model, graph, worlds, device)
-    task.sim.set_root_drive(*(ROOT_DRIVE if root == "tracked" else (0.0,) * 4))
-    return task
+    """Worlds that follow a reference from its first row to its last. root "tracked": virtual forces hold the
+    root to it, too, which carry the player's weight where its feet do not, and the targets are those that
+    `refine` finds. progress: of `refine`."""
+    if root == "free":
+        return Follow(model, clip_graph(model, reference, model.roles.feet), worlds, device)
+
+    def held(graph: ControlGraph, worlds: int = 1) -> Follow:
+        task = Follow(model, graph, worlds, device)
+        task.sim.set_root_drive(*ROOT_DRIVE)
+        return task
+
+    graph = clip_graph(model, reference, (), ROOT_DRIVE[1] / ROOT_DRIVE[0])
+    begin = starts(model, reference, 1, ball=False)
+    return held(refine(model, reference, graph, held, begin, progress), worlds)
 
 
 def starts(model: Model, reference: Reference, worlds: int, ball: bool) -> Starts:

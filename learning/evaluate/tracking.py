@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,26 @@ FALLEN = 0.6
 """A player has fallen when its root is lower than this share of the reference's height."""
 LIGHT = 0.1
 """[kg] Bodies below this (fingers) do not count in the tracking error."""
+STILL = 0.05
+"""[m/s] Of a standing foot's slowest point."""
 TOUCH = 0.006
 """[m] A gap below this counts as contact."""
+
+
+class Limb(NamedTuple):
+    """How far a foot or hand is from its reference."""
+
+    name: str
+    """its body"""
+    far: float
+    """[m] 95th percentile of the distance"""
+    worst: float
+    """[m]"""
+    frame: int
+    """where it is worst"""
+    sliding: float
+    """[m/s] 95th percentile of its slowest point that touches the ground, where the reference stands too; NaN
+    for hands and what never does"""
 
 
 @dataclass(frozen=True)
@@ -34,6 +53,8 @@ class Tracking:
     """(frames, 3) [m] where the root was."""
     wanted_root: np.ndarray
     """(frames, 3) [m] where the reference has it."""
+    limbs: tuple[Limb, ...]
+    """feet and hands, the worst first"""
 
     @property
     def falls(self) -> int:
@@ -59,7 +80,24 @@ def track(model: Model, seen: Trajectory) -> Tracking:
         contacts=find_contacts(model, body_q),
         root=body_q[:, root, :3],
         wanted_root=wanted[:, root, :3],
+        limbs=limbs(model, body_q, wanted, seen.timestep),
     )
+
+
+def limbs(model: Model, body_q: np.ndarray, wanted: np.ndarray, timestep: float) -> tuple[Limb, ...]:
+    """Feet and hands of body_q beside those wanted, both (frames, nbody, 7), the worst first."""
+    found = []
+    for name in (*model.roles.feet, *model.roles.hands):
+        body = model.body(name)
+        off = np.linalg.norm(body_q[:, body, :3] - wanted[:, body, :3], axis=1)
+        sliding = np.nan
+        if name in model.roles.feet:
+            own = model.descendants(body)
+            slow = gaps.sliding(model, wanted, own, timestep, TOUCH) < STILL
+            slides = gaps.sliding(model, body_q, own, timestep, TOUCH)[slow]
+            sliding = float(np.nanquantile(slides, 0.95)) if np.isfinite(slides).any() else np.nan
+        found.append(Limb(name, float(np.quantile(off, 0.95)), float(off.max()), int(off.argmax()), sliding))
+    return tuple(sorted(found, key=lambda limb: -limb.worst))
 
 
 def find_contacts(model: Model, body_q: np.ndarray) -> dict[str, np.ndarray]:

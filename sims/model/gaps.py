@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .slots import touch_points
+
 if TYPE_CHECKING:
     from .mjcf import Shape
     from .model import Model
@@ -49,6 +51,24 @@ def gap_to_bodies(
                 local[:, 2] -= np.clip(local[:, 2], -shape.size[1], shape.size[1])
             distances.append(np.linalg.norm(local, axis=1) - shape.size[0])
     return np.min(distances, axis=0)
+
+
+def sliding(
+    model: Model, body_q: np.ndarray, bodies: Collection[int], timestep: float, touch: float
+) -> np.ndarray:
+    """Speed (frames - 1,) [m/s] over the ground of what touches it: of the slowest among the points of the
+    shapes of `bodies` that are within `touch` [m] of it before a step and after, as feet roll; NaN where none
+    is."""
+    speeds = []
+    for shape in (s for s in model.shapes if s.body in bodies and s.kind != "plane"):
+        turn = Rotation.from_quat(body_q[:, shape.body, 3:])
+        for point, radius in touch_points(shape):
+            at = body_q[:, shape.body, :3] + turn.apply(point) - [0.0, 0.0, radius]
+            down = at[:, 2] < touch
+            v = np.linalg.norm(np.diff(at[:, :2], axis=0), axis=1) / timestep
+            speeds.append(np.where(down[1:] & down[:-1], v, np.inf))
+    slowest = np.min(speeds, axis=0)
+    return np.where(np.isfinite(slowest), slowest, np.nan)
 
 
 def _place(shape: Shape, body_q: np.ndarray) -> tuple[np.ndarray, Rotation]:

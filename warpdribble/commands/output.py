@@ -96,6 +96,13 @@ def say_trajectory(model: Model, seen: Trajectory, root: str) -> Tracking:
         f"tracking  joints {np.degrees(found.angle_error.mean()):.1f} degrees, "
         f"bodies {100.0 * found.position_error.mean():.1f} cm off (means, fingers left out)"
     )
+    if root == "tracked":
+        limb, slides = found.limbs[0], np.nanmax([0.0, *(limb.sliding for limb in found.limbs)])
+        say(
+            f"          worst limb {limb.name}, {100.0 * limb.worst:.1f} cm off in frame {limb.frame}, "
+            f"{100.0 * limb.far:.1f} cm in 95 % of the time"
+        )
+        say(f"          standing feet slide at {100.0 * slides:.0f} cm/s or less in 95 % of the time")
     say(f"falls     {found.falls}{fell}")
     if "ball on ground" in found.contacts:
         ground = found.contacts["ball on ground"]

@@ -48,6 +48,7 @@ class Simulate(ClipInput, Outputs):
     """The player, or the path of an MJCF file with the same body names."""
 
     def run(self) -> int:
+        from ..learning.evaluate import refine
         from ..learning.evaluate.attempts import TRIES, follow, starts
         from ..learning.tasks.follow import OpenLoop
         from ..sims import Model
@@ -68,7 +69,9 @@ class Simulate(ClipInput, Outputs):
         model, reference = self._without_ball(model, one, reference)
         tries = TRIES if one.ball is not None and reference.duration < SHORT else 1
         with compiling():
-            task = warmed(follow(model, reference, tries, self.root, self.device))
+            warmed(follow(model, reference, 1, "free", self.device))
+        with bar("finding targets", refine.TRIES if self.root == "tracked" else 0) as progress:
+            task = follow(model, reference, tries, self.root, self.device, progress)
         begin = starts(model, reference, tries, one.ball is not None)
         seen = _record(task, OpenLoop(), begin).first(reference.frame_count)
         write_outputs(self, model, seen, say_trajectory(model, seen, self.root), _title(one), self.root)

@@ -1,0 +1,54 @@
+"""Targets found by trying: against the targets that are only led, on a stride that is authored here."""
+
+import numpy as np
+import pytest
+
+from warpdribble.learning.evaluate.attempts import follow, starts
+from warpdribble.learning.evaluate.record import record
+from warpdribble.learning.evaluate.refine import TRIES
+from warpdribble.learning.evaluate.tracking import track
+from warpdribble.learning.graph import clip_graph
+from warpdribble.learning.tasks.follow import Follow, OpenLoop
+from warpdribble.sims.reference import Reference
+
+
+@pytest.fixture(scope="module")
+def strides(player):
+    """Legs that swing and bend in the air at 1 Hz, hips by 30 degrees."""
+    t = np.arange(0.0, 2.0, player.timestep)
+    joint_q = np.tile(player.start_q, (len(t), 1)).astype(float)
+    joint_q[:, 2] += 0.3
+    for sign, side in ((1.0, "l"), (-1.0, "r")):
+        angle = sign * np.radians(30.0) * np.sin(2.0 * np.pi * t)
+        hip = player.q_slice(f"{side}_hip")
+        joint_q[:, hip] = np.stack([0 * t, np.sin(angle / 2), 0 * t, np.cos(angle / 2)], axis=1)
+        joint_q[:, player.q_slice(f"{side}_knee")] = np.abs(angle)[:, None]
+    return Reference(joint_q, player.timestep)
+
+
+def followed(player, reference, task):
+    graph = task.graph
+    seen = record(task, OpenLoop(), starts(player, reference, 1, ball=False), graph.count, worlds=[0])[0]
+    return track(player, seen.first(reference.frame_count))
+
+
+def test_feet_are_where_the_reference_has_them(player, strides):
+    """Led alone they are 6 times as far off; there is nothing to slide on."""
+    found = followed(player, strides, follow(player, strides, 1, "tracked"))
+    graph = clip_graph(player, strides, (), 0.1)
+    led = Follow(player, graph, 1)
+    led.sim.set_root_drive(300e3, 30e3, 60e3, 6e3)
+    before = followed(player, strides, led)
+    assert max(limb.far for limb in found.limbs) < 0.01
+    assert max(limb.far for limb in before.limbs) > 0.03
+    assert all(np.isnan(limb.sliding) for limb in found.limbs)
+    assert found.falls == 0
+
+
+def test_progress_is_said_and_the_first_try_is_kept_where_it_is_best(player):
+    """A player held still in the air: there is little to learn, and nothing gets worse."""
+    still = Reference(np.tile(player.start_q, (41, 1)) + 0.5 * (np.arange(player.nq) == 2), player.timestep)
+    said = []
+    task = follow(player, still, 1, "tracked", progress=said.append)
+    assert said == list(range(1, TRIES + 1))
+    assert followed(player, still, task).position_error.mean() < 2e-3
