@@ -22,6 +22,7 @@ from ..recording.motion import Motion
 from ..reference.reference import Reference
 from ..signals import low_pass, low_pass_rotations
 from .calibrate import match_limbs, since_rest
+from .head import along_neck, told
 from .knees import Leg, ease_knees
 from .mapping import Mapping, find_mapping
 from .planting import Stand, Tread, find_stands, standing
@@ -57,7 +58,7 @@ class Retargeted:
     moved: np.ndarray | None = None
     """(frames, 3) [m] by which the root gave way for the legs to reach, and to do so without jerks."""
     notes: tuple[str, ...] = ()
-    """What was guessed or put right of the recording's T-pose."""
+    """What was guessed or put right of the recording's T-pose, and of its neck."""
 
 
 def retarget(model: Model, motion: Motion, mapping: Mapping | None = None, ik: bool = True) -> Reference:
@@ -83,6 +84,9 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
 
     since = since_rest(motion, frames)
     turned = _body_rotations(model, motion, positions, since, mapping)
+    if ik and (line := along_neck(model, motion, mapping, positions, since)) is not None:
+        head = str(model.roles.head)
+        notes, turned[head] = (*notes, *told(turned[head], line)), line
     joint_q = np.tile(np.asarray(model.start_q, dtype=float), (motion.frame_count, 1))
     root = model.body_names[model.joint_body(model.root)]
     if root in mapping.smoothed:
