@@ -100,7 +100,7 @@ def test_directions_find_the_trunk_of_any_name(player, other, mocap):
     )
     np.testing.assert_array_equal(one.reference.joint_q, two.reference.joint_q)
     headless = replace(theirs, bodies={k: v for k, v in theirs.bodies.items() if k != "skull"})
-    with pytest.raises(MappingError, match="^cmu: bodies: names no head"):
+    with pytest.raises(MappingError, match=r"^cmu: bodies: names no head"):
         retargeted(other, motion.slice(0, 60), headless)
 
 
