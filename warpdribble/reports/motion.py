@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,10 @@ from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from ..clips.read import SUFFIXES, read_clip
+from ..learning.evaluate.attempts import follow, starts
+from ..learning.evaluate.record import record
+from ..learning.evaluate.tracking import Limb, track
+from ..learning.tasks.follow import OpenLoop
 from ..sims import Model
 from ..sims.model import pose
 from ..sims.recording import anatomy
@@ -29,6 +33,7 @@ from ..sims.retarget.sole import Foot, find_foot
 
 SHAKE = (5.0, 30.0)
 """[Hz] Faster than people move their knees, slower than what a frame rate of 60 Hz shows."""
+BARE = cache(lambda: Model.load("player", without=("ball",)))
 ENDS = 5
 """Rows at either end that a filter spoils."""
 
@@ -54,6 +59,16 @@ class Case:
     @cached_property
     def body_q(self) -> np.ndarray:
         return pose.forward(self.model, self.result.reference.joint_q)
+
+    @cached_property
+    def tracked(self) -> list[Limb]:
+        """The feet, simulated without the ball while the root is held to the clip."""
+        bare, reference = BARE(), self.result.reference
+        reference = replace(reference, joint_q=bare.convert_q(self.model, reference.joint_q))
+        task = follow(bare, reference, 1, "tracked")
+        begin = starts(bare, reference, 1, ball=False)
+        seen = record(task, OpenLoop(), begin, task.graph.count)[0].first(reference.frame_count)
+        return [limb for limb in track(bare, seen).limbs if limb.name in bare.roles.feet]
 
     def angle(self, joint: str, copied: bool = False) -> np.ndarray:
         """(frames,) [rad] of a hinge."""
@@ -165,6 +180,19 @@ def joints(case: Case) -> float:
     return 100.0 * case.fit.mean
 
 
+def tracked_feet(case: Case) -> float:
+    return 100.0 * max(limb.far for limb in case.tracked)
+
+
+def tracked_worst(case: Case) -> float:
+    return 100.0 * max(limb.worst for limb in case.tracked)
+
+
+def tracked_sliding(case: Case) -> float | None:
+    known = [100.0 * limb.sliding for limb in case.tracked if np.isfinite(limb.sliding)]
+    return max(known) if known else None
+
+
 MEASURES: dict[str, Callable[[Case], float | None]] = {
     "rows in which a foot skims the ground, %": skimming,
     "swinging feet lower than recorded, 95 %, cm": lower,
@@ -174,6 +202,9 @@ MEASURES: dict[str, Callable[[Case], float | None]] = {
     "a hand turns in 10 ms, at most, degrees": hands,
     "standing feet slide, mm/s": sliding,
     "mean joint error, cm": joints,
+    "tracked: feet off the reference, 95 %, cm": tracked_feet,
+    "tracked: feet off the reference, at worst, cm": tracked_worst,
+    "tracked: standing feet slide, 95 %, cm/s": tracked_sliding,
 }
 
 
