@@ -3,7 +3,10 @@
 import warp as wp
 
 from .spatial import *
-from .tree import POINT_PLANE, SPHERE_BOX, SPHERE_CAPSULE, Tree, World
+from .tree import PARALLEL, POINT_PLANE, SPHERE_BOX, SPHERE_CAPSULE, Tree, World
+
+APART = wp.constant(1.0e3)
+"""Gap of a slot that its pair has no use for [m]."""
 
 
 @wp.struct
@@ -57,9 +60,18 @@ def sphere_capsule(tree: Tree, world: World, g: int, slot: int) -> Touch:
     return between(x + t * axis, s, tree.shape_radius[a], tree.shape_radius[b])
 
 
+SLACK = wp.constant(0.001)
+"""How much deeper than at its ends a contact of nearly parallel capsules may be in between, in parts of the
+sum of their radii."""
+CROSSED = wp.constant(4.0)
+"""1 / sin of the angle, about 15 degrees, from which on capsules have one contact."""
+
+
 @wp.func
-def capsule_capsule(tree: Tree, world: World, g: int, slot: int) -> Touch:
-    """Nearest points of two segments (Ericson 2005, 5.1.9)."""
+def capsule_capsule(tree: Tree, world: World, g: int, slot: int, side: float) -> Touch:
+    """Nearest points of two segments (Ericson 2005, 5.1.9), or, where they are nearly parallel, one end of
+    the stretch in which they are about as near: the one towards the end of a's axis where `side` is 1, the
+    other where it is -1. Both draw together as the angle grows, until there is one contact, `side` -1."""
     a = tree.slot_a[slot]
     b = tree.slot_b[slot]
     xa = centre(tree, world, g, a)
@@ -72,13 +84,33 @@ def capsule_capsule(tree: Tree, world: World, g: int, slot: int) -> Touch:
     uu = max(dot(u, u), tiny)
     vv = max(dot(v, v), tiny)
     uv = dot(u, v)
-    s = (dot(d, u) * vv - dot(d, v) * uv) / max(uu * vv - uv * uv, 1.0e-6 * (uu * vv))
+    du = dot(d, u)
+    s = (du * vv - dot(d, v) * uv) / max(uu * vv - uv * uv, 1.0e-6 * (uu * vv))
     s = max(neg(one), min(one, s))
     t = (s * uv - dot(d, v)) / vv
     t = max(neg(one), min(one, t))
-    s = (t * uv + dot(d, u)) / uu
+    s = (t * uv + du) / uu
     s = max(neg(one), min(one, s))
-    return between(xa + s * u, xb + t * v, tree.shape_radius[a], tree.shape_radius[b])
+    # the ends: no further from s than SLACK allows, nor than the segments lie side by side
+    w = cross(u, v)
+    crossed = sqrt(uu * vv / max(dot(w, w), 1.0e-12 * (uu * vv)))
+    radii = tree.shape_radius[a] + tree.shape_radius[b]
+    reach = wp.sqrt(2.0 * SLACK) * radii * max(crossed - CROSSED, fill(0.0)) / sqrt(uu)
+    half = abs(uv) / uu
+    low = max(s - reach, max(neg(one), du / uu - half))
+    high = min(s + reach, min(one, du / uu + half))
+    low = min(s, low)
+    high = max(s, high)
+    end = low
+    if side > 0.0:
+        end = high
+    t_end = max(neg(one), min(one, (end * uv - dot(d, v)) / vv))
+    t = where_lt(high, low + tiny, t, t_end)
+    touch = between(xa + end * u, xb + t * v, tree.shape_radius[a], tree.shape_radius[b])
+    if side > 0.0:
+        same = (high - low) * sqrt(uu) - 0.01 * radii
+        touch.gap = where_lt(same, fill(0.0), fill(APART), touch.gap)
+    return touch
 
 
 @wp.func
@@ -128,4 +160,6 @@ def probe(tree: Tree, world: World, g: int, slot: int) -> Touch:
         return sphere_capsule(tree, world, g, slot)
     if kind == SPHERE_BOX:
         return sphere_box(tree, world, g, slot)
-    return capsule_capsule(tree, world, g, slot)
+    if kind == PARALLEL:
+        return capsule_capsule(tree, world, g, slot, 1.0)
+    return capsule_capsule(tree, world, g, slot, -1.0)

@@ -23,6 +23,8 @@ POINT_PLANE = wp.constant(0)
 SPHERE_CAPSULE = wp.constant(1)
 SPHERE_BOX = wp.constant(2)
 CAPSULE_CAPSULE = wp.constant(3)
+PARALLEL = wp.constant(4)
+"""two capsules' second contact"""
 
 
 @wp.struct

@@ -21,7 +21,7 @@ from .mjcf import Shape, Tables
 if TYPE_CHECKING:
     import mujoco
 
-POINT_PLANE, SPHERE_CAPSULE, SPHERE_BOX, CAPSULE_CAPSULE = range(4)
+POINT_PLANE, SPHERE_CAPSULE, SPHERE_BOX, CAPSULE_CAPSULE, PARALLEL = range(5)
 
 
 class Pair(TypedDict):
@@ -202,6 +202,7 @@ def build_slots(
             add(SPHERE_BOX if kinds[0] == "box" else SPHERE_CAPSULE, a, b)
         else:
             add(CAPSULE_CAPSULE, a, b)
+            add(PARALLEL, a, b)
     if left_out:
         warnings.warn(
             f"contacts between boxes and boxes or capsules are not simulated: {len(left_out)} pairs, "
