@@ -1,4 +1,4 @@
-"""Contacts with friction, by projected Gauss-Seidel in whitened coordinates.
+"""Contacts in whitened coordinates: which there are, and what they answer to.
 
 With w = D^(1/2) L qd (see `articulated`) a contact row J becomes y = D^(-1/2) L^(-T) J^T, which is zero
 but for the dofs between the two bodies and the root. The row's velocity is y . w, an impulse changes w
@@ -8,7 +8,7 @@ normal and two tangents, are held side by side, as is everything here that comes
 
 import warp as wp
 
-from .bounce import BOUNCE_SPEED, bounce
+from .bounce import bounce
 from .collide import Touch, probe
 from .kinematics import joint_dofs, load3
 from .rows import rows_change, rows_velocity
@@ -24,6 +24,8 @@ PUSH_LIMIT = wp.constant(2.0)
 """Overlap is taken back no faster than this [m/s]."""
 
 
+SOFT = wp.constant(1.0e-4)
+"""Contacts of a larger cfm are springs, as soles are: what they push stays as velocity."""
 REACH = wp.constant(0.3)
 """Nothing comes nearer than this within a step [m]; at h = 0.01 s, 30 m/s."""
 HEAD = wp.constant(5)
@@ -191,17 +193,11 @@ def add_impulse(tree: Tree, world: World, g: int, slot: int, at: int, change: Ve
 
 
 @wp.func
-def wish(tree: Tree, world: World, g: int, slot: int, gap: Real, u: Real, lively: Real) -> Real:
-    """Least normal velocity [m/s] to leave a slot with: what closes the gap, takes back some of an
-    overlap, or, where `lively` is positive, returns the approach velocity u with restitution."""
-    h = tree.h
-    pair = tree.slot_pair[slot]
-    zero = fill(0.0)
-    close = (-1.0 / h) * gap
-    goal = where_lt(zero, gap, close, min(tree.pair_erp[pair] * close, fill(PUSH_LIMIT)))
-    back = where_lt(u, fill(-BOUNCE_SPEED), neg(world.restitution[g, pair] * u), goal)
-    back = where_lt(gap + h * u, zero, back, goal)
-    return where_lt(zero, lively, max(goal, back), goal)
+def wish(tree: Tree, slot: int, gap: Real) -> Real:
+    """Least normal velocity [m/s] of a slot within the step: what closes the gap, or takes back some of an
+    overlap."""
+    close = (-1.0 / tree.h) * gap
+    return where_lt(fill(0.0), gap, close, min(tree.pair_erp[tree.slot_pair[slot]] * close, fill(PUSH_LIMIT)))
 
 
 @wp.func
@@ -216,9 +212,13 @@ def enlist(tree: Tree, world: World, g: int, slot: int, touch: Touch, near: Real
         end = world.active[g, last + 1]
     margin = fill(MARGIN)
     impulse = where_lt(near, margin, world.impulse[g, slot], zero3())
+    goal = where_lt(near, margin, goal, fill(NEVER))
     world.point[g, slot] = touch.point
     world.normal[g, slot] = touch.normal
-    world.goal[g, slot] = where_lt(near, margin, goal, fill(NEVER))
+    world.goal[g, slot] = goal
+    world.kept[g, slot] = min(goal, fill(0.0))
+    if tree.pair_cfm[tree.slot_pair[slot]] > SOFT:
+        world.kept[g, slot] = goal
     world.impulse[g, slot] = impulse
     world.active[g, 2 * n] = slot
     world.active[g, 2 * n + 1] = at
@@ -252,8 +252,7 @@ def find(tree: Tree, world: World, g: int):
                 b = tree.slot_link_b[slot]
                 world.touched[g, a] = min(world.touched[g, a], near)
                 world.touched[g, b] = min(world.touched[g, b], near)
-                goal = wish(tree, world, g, slot, touch.gap, dot(touch.normal, v), far)
-                enlist(tree, world, g, slot, touch, near, goal)
+                enlist(tree, world, g, slot, touch, near, wish(tree, slot, touch.gap))
             else:
                 world.impulse[g, slot] = zero3()
     for b in range(tree.flyer_count):
@@ -270,7 +269,7 @@ def find(tree: Tree, world: World, g: int):
             if any_lt(near, margin):
                 near = where_lt(fill(0.0), (1.0 - more) * world.knock[g, f], far, near)
                 gap = touch.gap + dot(touch.normal, shift)
-                goal = wish(tree, world, g, slot, gap, dot(touch.normal, v), neg(free))
+                goal = wish(tree, slot, gap)
                 enlist(tree, world, g, slot, touch, near, goal)
             else:
                 world.impulse[g, slot] = zero3()
@@ -291,96 +290,12 @@ def velocity(tree: Tree, world: World, g: int, slot: int, at: int) -> Vec3:
 
 
 @wp.func
-def settle(world: World, g: int, at: int, u: Vec3, old: Vec3, goal: Real, friction: Real) -> Vec3:
-    """The impulse that suits a slot by itself, u being its velocity with the impulse `old`: sticking
-    where friction allows it; else slipping, normal and friction found together, as friction may lift
-    or press."""
-    a = world.y[g, at]
-    b = world.y[g, at + 1]
-    more = world.y[g, at + 4]
-    zero = fill(0.0)
-    # what the velocity lacks, were the impulse taken away
-    n0 = goal - (u.x - a.x * old.x - a.y * old.y - a.z * old.z)
-    t0 = a.y * old.x + b.x * old.y + b.y * old.z - u.y
-    s0 = a.z * old.x + b.y * old.y + b.z * old.z - u.z
-    # sticking: G x = (n0, t0, s0)
-    c = world.y[g, at + 2]
-    d = world.y[g, at + 3]
-    n = c.x * n0 + c.y * t0 + c.z * s0
-    t = c.y * n0 + d.x * t0 + d.y * s0
-    s = c.z * n0 + d.y * t0 + d.z * s0
-    grip = friction * max(n, zero)
-    slips = t * t + s * s - grip * grip
-    # slipping: against the slip, by as long a step as is stable
-    dt = old.y - more.y * u.y
-    ds = old.z - more.y * u.z
-    unit = 1.0 / sqrt(max(dt * dt + ds * ds, fill(1.0e-24)))
-    dt = unit * dt
-    ds = unit * ds
-    n_slip = max(n0, zero) / max(more.x + friction * (a.y * dt + a.z * ds), 0.5 * more.x)
-    grip = friction * n_slip
-    return Vec3(
-        where_lt(slips, zero, n, n_slip),
-        where_lt(slips, zero, t, grip * dt),
-        where_lt(slips, zero, s, grip * ds),
-    )
-
-
-@wp.func
-def residual(tree: Tree, world: World, g: int) -> Real:
-    """Largest velocity [m/s] by which a slot misses non-penetration or Coulomb's law: the step of the
-    natural map, times the slot's inverse inertia."""
-    worst = fill(0.0)
+def drop_impulses(tree: Tree, world: World, g: int):
+    """As if nothing had been solved."""
     for k in range(world.active[g, 2 * tree.slot_count]):
         slot = world.active[g, 2 * k]
         at = world.active[g, 2 * k + 1]
         if at == tree.response_room:
             respond(tree, world, g, slot, at)
-        u = velocity(tree, world, g, slot, at)
-        x = world.impulse[g, slot]
-        pair = tree.slot_pair[slot]
-        soft = tree.pair_cfm[pair] / tree.h
-        nn = world.y[g, at].x
-        n = max(fill(0.0), x.x - (u.x + soft * x.x - world.goal[g, slot]) / nn)
-        stiff = world.y[g, at + 4].z
-        t = x.y - u.y / stiff
-        s = x.z - u.z / stiff
-        grip = world.friction[g, pair] * x.x
-        back = min(grip / sqrt(max(t * t + s * s, fill(1.0e-24))), fill(1.0))
-        t = back * t - x.y
-        s = back * s - x.z
-        worst = max(worst, nn * abs(n - x.x))
-        worst = max(worst, stiff * sqrt(t * t + s * s))
-    return worst
-
-
-@wp.func
-def solve(tree: Tree, world: World, g: int):
-    """Sweeps over the slots in use, forward and backward in turn."""
-    count = world.active[g, 2 * tree.slot_count]
-    for sweep in range(tree.sweeps):
-        for k in range(count):
-            c = k
-            if sweep % 2 == 1:
-                c = count - 1 - k
-            slot = world.active[g, 2 * c]
-            at = world.active[g, 2 * c + 1]
-            if at == tree.response_room:
-                respond(tree, world, g, slot, at)
-            pair = tree.slot_pair[slot]
-            old = world.impulse[g, slot]
-            u = velocity(tree, world, g, slot, at)
-            impulse = settle(world, g, at, u, old, world.goal[g, slot], world.friction[g, pair])
-            add_impulse(tree, world, g, slot, at, impulse - old)
-            world.impulse[g, slot] = impulse
-    zero = fill(0.0)
-    one = fill(1.0)
-    for k in range(count):
-        slot = world.active[g, 2 * k]
-        flag = tree.slot_flag[slot]
-        if flag != 0:
-            push = world.impulse[g, slot].x
-            if flag == 1:
-                world.fallen[g, 0] = where_lt(zero, push, one, world.fallen[g, 0])
-            else:
-                world.fumbled[g, 0] = where_lt(zero, push, one, world.fumbled[g, 0])
+        add_impulse(tree, world, g, slot, at, neg(world.impulse[g, slot]))
+        world.impulse[g, slot] = zero3()

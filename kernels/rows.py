@@ -1,5 +1,6 @@
-"""The two loops in which the contact solver spends its time, written in C++ so that they keep their
-pointers and sums in registers: a slot's velocity y . w, and the change y . x of w by an impulse.
+"""The loops in which the contact solver spends its time, written in C++ so that they keep their pointers
+and sums in registers: a slot's velocity y . w, the change y . x of w by an impulse, and the step of w along
+the way that it has come.
 """
 
 import warp as wp
@@ -57,6 +58,22 @@ _CHANGE = f"""
     }}
 """
 
+_AHEAD = f"""
+    {_TYPES}
+    V theta_;
+    memcpy(&theta_, &theta, sizeof(V));
+    char* w_ = (char*)w.data + g * (size_t)w.strides[0];
+    char* old_ = (char*)old.data + g * (size_t)old.strides[0];
+    const size_t dw = w.strides[1], dold = old.strides[1];
+    for (int k = 0; k < count; ++k) {{
+        V* a = (V*)(w_ + k * dw);
+        V* b = (V*)(old_ + k * dold);
+        const V now = *a;
+        *a = now + theta_ * (now - *b);
+        *b = now;
+    }}
+"""
+
 _PART = (
     "return a[i];"
     if LANES == 1
@@ -89,6 +106,12 @@ def _change(
     t: Real,
     s: Real,
 ): ...
+
+
+@wp.func_native(_AHEAD.replace("memcpy", "__builtin_memcpy") if LANES > 1 else _AHEAD)
+def row_ahead(w: wp.array2d(dtype=Real), old: wp.array2d(dtype=Real), g: int, count: int, theta: Real):
+    """w += theta (w - old), old = w before, for the first `count` of each."""
+    ...
 
 
 @wp.func_native(_PART)

@@ -7,11 +7,14 @@ import warp as wp
 
 from .aim import Course, aim
 from .articulated import factorize, judge_drives, velocities
-from .contact import HEAD, find, residual, solve  # noqa: F401
+from .contact import HEAD, drop_impulses, find  # noqa: F401
 from .drive import LAST_TRIAL
 from .integrate import integrate
 from .kinematics import inertias, kinematics
+from .settle import residual
+from .solve import keep, solve
 from .spatial import *
+from .strike import strike
 from .tree import CARRIED, COLUMNS, Tree, World  # noqa: F401
 from .watch import Watch, begin, look
 
@@ -41,9 +44,12 @@ def advance(tree: Tree, world: World, g: int):
         if not judge_drives(tree, world, g, trial):
             trial = LAST_TRIAL
     find(tree, world, g)
+    strike(tree, world, g)
     solve(tree, world, g)
     velocities(tree, world, g)
     integrate(tree, world, g)
+    if keep(tree, world, g):
+        velocities(tree, world, g)
 
 
 @wp.kernel
@@ -104,6 +110,7 @@ def run_find(tree: Tree, world: World, first: int, count: int):
 def run_solve(tree: Tree, world: World, first: int, count: int):
     g = first + wp.tid()
     for _k in range(count):
+        drop_impulses(tree, world, g)  # or the next one would be done at once
         solve(tree, world, g)
 
 

@@ -180,9 +180,16 @@ class World:
     point: wp.array2d(dtype=Vec3)
     normal: wp.array2d(dtype=Vec3)
     goal: wp.array2d(dtype=Real)
-    """least normal velocity that a slot may be left with [m/s]"""
+    """least normal velocity that a slot may have within the step [m/s]"""
+    kept: wp.array2d(dtype=Real)
+    """least that it may be left with once the step is done"""
     impulse: wp.array2d(dtype=Vec3)
     """along the normal and two tangents [N s]"""
+    settled: wp.array2d(dtype=Vec3)
+    """impulse after the last sweep, and what that changed of it [N s]; see `solve`"""
+    change: wp.array2d(dtype=Vec3)
+    w_settled: wp.array2d(dtype=Real)
+    """w after the last sweep"""
     y: wp.array2d(dtype=Vec3)
     """responses of the slots in use, the head of each and then an entry per dof (see `contact`)"""
     active: wp.array2d(dtype=int)
@@ -190,6 +197,9 @@ class World:
     the end of y"""
     touched: wp.array2d(dtype=Real)
     """least distance of a flyer to anything but planes that it may come to within the step [m]"""
+    struck: wp.array2d(dtype=Real)
+    """of the first link of a tree: what is left of the step when something strikes the tree; of link 0: the
+    same of any tree [s]"""
     knock: wp.array2d(dtype=Real)
     """impulse of a flyer's bounces off a plane in this step [N s]"""
 
@@ -202,10 +212,10 @@ class World:
 
 COLUMNS = {
     "q": "q target",
-    "dof": "qd joint_f s U d w",
-    "link": "mass_scale turn R pos r V A I p pull torque full touched",
+    "dof": "qd joint_f s U d w w_settled",
+    "link": "mass_scale turn R pos r V A I p pull torque full touched struck",
     "flight": "knock",
-    "slot": "gap point normal goal impulse",
+    "slot": "gap point normal goal kept impulse settled change",
     "pair": "friction restitution",
     "body": "force",
     "world": "broken fallen fumbled hurried",

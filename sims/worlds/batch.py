@@ -18,7 +18,7 @@ from ... import kernels
 from ..model import Model
 from .state import QUANTITIES, Block, Layout
 
-RESPONSE_ROOM = 1365
+RESPONSE_ROOM = 1130
 """Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
 
 

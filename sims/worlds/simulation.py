@@ -15,8 +15,8 @@ from .batch import Batch
 from .state import Layout, State
 from .tensors import Tensors, as_array
 
-SWEEPS = 10
-"""Sweeps of the contact solver a step; docs/physics.md shows the residual that this leaves."""
+SWEEPS = 6
+"""Usual sweeps of the contact solver a step; docs/physics.md shows the residual that this leaves."""
 
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
@@ -35,7 +35,7 @@ class Contacts:
     shapes: list[tuple[str, str]]
     """(slots) names; impulses push the second along the normal"""
     gap: np.ndarray
-    """(world_count, slots) [m], negative: overlap"""
+    """(world_count, slots) [m], negative: overlap; 1000 for the second slot of capsules that need one"""
     point: np.ndarray
     """(world_count, slots, 3) half way between the surfaces [m]"""
     normal: np.ndarray
