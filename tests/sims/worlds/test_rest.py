@@ -177,3 +177,27 @@ def test_contacts_move_steadily_as_capsules_turn():
     assert max(steps) <= 0.02
     at_end = np.flatnonzero(np.diff(used))
     assert np.abs(one - two)[at_end].max() <= 0.01
+
+
+def test_worlds_stop_for_themselves():
+    """A world that needs many sweeps changes no bit of its neighbours, whom few suffice."""
+    model = scene(
+        ground() + geom("light", "sphere", 0.12, 0.62) + geom("heavy", "box", "0.1 0.1 0.1", 0.62), H
+    )
+    q = np.array([0, 0, 0.12, 0, 0, 0, 1, 0.3, 0, 0.1, 0, 0, 0, 1])
+    q = np.tile(q, (16, 1))
+    q[:, 9] += np.linspace(0, 0.3, 16)
+    q[8:, 7] = 0.02  # onto the ball
+    mass = 0.62 * np.geomspace(1, 300, 16)
+
+    def run(worlds):
+        sim = Simulation(model, len(worlds), lanes=16)
+        sim.reset(joint_q=q[worlds])
+        sim.set_mass("heavy", mass[worlds])
+        sim.set_contact("heavy", "ground", restitution=0.5)
+        sim.step(100)
+        return np.concatenate([sim.joint_q, sim.joint_qd], axis=1)
+
+    together = run(np.arange(16))
+    for world in (0, 3, 8, 12, 15):
+        np.testing.assert_array_equal(run(np.array([world]))[0], together[world])
