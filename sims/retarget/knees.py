@@ -9,6 +9,7 @@ near to what it was.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -55,8 +56,8 @@ def ease_knees(model: Model, joint_q: np.ndarray, legs: list[Leg]) -> tuple[np.n
     # a row's unknowns stand together: the root's way, then a knee angle per leg
     x = np.concatenate([np.zeros((count, 3)), np.stack(copied, axis=1)], axis=1)
     pick = [_pick(x.shape, k) for k in range(x.shape[1])]
-    second = sparse.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(max(count - 2, 0), count), format="csr")
-    second = second / model.timestep**2
+    stencil = np.array([1.0, -2.0, 1.0]) / model.timestep**2
+    second = sparse.diags(stencil, [0, 1, 2], shape=(max(count - 2, 0), count), format="csr")
 
     for _ in range(ROUNDS):
         terms = []
@@ -95,10 +96,11 @@ def _bent(angle: np.ndarray) -> np.ndarray:
     return STRAIGHT + 0.5 * (over + np.hypot(over, STRAIGHT))
 
 
-def _least_squares(terms: list[tuple], bands: int) -> np.ndarray:
+def _least_squares(terms: list[tuple[Any, Any, Any]], bands: int) -> np.ndarray:
     """The step s for which the sum of |weight (change s + now)|^2 over terms (weight, change, now) is least;
     unknowns that are `bands` or more apart never meet."""
-    normal, right = 0.0, 0.0
+    normal: Any = 0.0
+    right: Any = 0.0
     for weight, change, now in terms:
         part, rest = weight * change, weight * now
         if sparse.issparse(weight):

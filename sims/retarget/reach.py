@@ -144,8 +144,8 @@ def brought_within(turn: Rotation, largest: float, instead: Rotation) -> Rotatio
     as at half a turn the axis turns round and what is cut back jumps to the range's other side."""
     share = smoothstep(np.clip((turn.magnitude() - largest) / BEYOND, 0.0, 1.0))[:, None]
     # with w >= 0, quaternions within an angle are a cone: what lies between two of them is within it too
-    cut, instead = within(turn, largest), instead.as_quat(canonical=True)
-    return Rotation.from_quat((1.0 - share) * cut.as_quat(canonical=True) + share * instead)
+    cut, far = (r.as_quat(canonical=True) for r in (within(turn, largest), instead))
+    return Rotation.from_quat((1.0 - share) * cut + share * far)
 
 
 def within(turn: Rotation, largest: float) -> Rotation:

@@ -164,15 +164,17 @@ def _plant(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Bring both legs of joint_q, in place, to feet that stand where they stand. Returns the root's way
     (frames, 3) [m], and by how much (frames,) [rad] each foot is turned from what it should be."""
-    paths, legs, stiff = {}, [], {}
+    turns: dict[str, tuple[Rotation, np.ndarray]] = {}
+    legs, stiff = [], {}
     for name, tread in treads.items():
-        ankle, *paths[name] = swinging(find_foot(model, name), tread, stands[name], model.timestep)
+        ankle, turn, toes = swinging(find_foot(model, name), tread, stands[name], model.timestep)
+        turns[name] = turn, toes
         legs.append(Leg(knees[name], ankle, standing(stands[name], len(ankle))))
     moved, ankles = ease_knees(model, joint_q, legs)
     moved[:, 2] -= lower_root(model, joint_q, {leg.hinge: ankle for leg, ankle in zip(legs, ankles)})
     for name, ankle in zip(treads, ankles):
         foot = find_foot(model, name)
-        stiff[name] = _place_foot(model, joint_q, foot, knees[name], ankle, *paths[name])
+        stiff[name] = _place_foot(model, joint_q, foot, knees[name], ankle, *turns[name])
     return moved, stiff
 
 
