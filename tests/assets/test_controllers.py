@@ -34,4 +34,4 @@ def test_it_is_not_far_from_its_reference():
     one = Run.load("dribble-right-authored").learned(STAGES)
     trials = run_trials(one.task(16), one.controller, one.starts, 5)
     assert np.degrees(trials.angle_error) < 1.0  # per joint of legs and trunk
-    assert trials.end_error < 0.01 and trials.drift < 0.01
+    assert trials.end_error < 0.015 and trials.drift < 0.01 and np.degrees(trials.astray) < 10.0
