@@ -227,8 +227,8 @@ def velocities(tree: Tree, world: World, g: int):
 
 @wp.func
 def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
-    """Root to leaves: the velocities that w stands for, and by them, which drives are at their limit.
-    Whether any drive of any lane has changed. Uses p, which `factorize` has consumed, for V."""
+    """Root to leaves: the velocities that w stands for, and by them, but for trial 0, which drives are at
+    their limit. Whether any drive of any lane has changed. Uses p, which `factorize` has consumed, for V."""
     changed = fill(0.0)
     for i in range(1, tree.link_count + 1):
         joint = tree.link_joint[i]
@@ -238,7 +238,7 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
         if joint == HINGE:
             v = rate(world, g, j, V)
             V.w = V.w + v * world.s[g, j]
-            if tree.link_driven[i] != 0:
+            if trial > 0 and tree.link_driven[i] != 0:
                 end = Vec3(v, fill(0.0), fill(0.0))
                 changed = changed + judge(tree, world, g, i, end, trial)
         else:
@@ -251,7 +251,7 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
             for k in range(3):
                 v = rate(world, g, j + k, V)
                 V.w = V.w + v * world.s[g, j + k]
-            if tree.link_driven[i] != 0:
+            if trial > 0 and tree.link_driven[i] != 0:
                 end = mul_t(world.R[g, i], V.w - before)
                 changed = changed + judge(tree, world, g, i, end, trial)
         world.p[g, i] = Force(V.w, V.v)

@@ -238,6 +238,8 @@ def find(tree: Tree, world: World, g: int):
     world.active[g, 2 * tree.slot_count + 1] = 0
     for b in range(tree.flyer_count):
         world.touched[g, tree.flyer_link[b]] = far
+    for t in range(tree.tumbler_count):
+        world.touched[g, tree.tumbler_link[t]] = far
     for slot in range(tree.slot_count):
         if tree.slot_flight[slot] == 0:
             touch = probe(tree, world, g, slot)

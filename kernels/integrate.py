@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from .contact import MARGIN
 from .kinematics import load3, load4, store3, store4
 from .spatial import *
 from .tree import BALL, FREE, Tree, World
@@ -20,8 +21,16 @@ def integrate(tree: Tree, world: World, g: int):
         iq = tree.link_q[i]
         iv = tree.link_dof[i]
         if joint == FREE:
-            store3(world.q, g, iq, load3(world.q, g, iq) + h * load3(world.qd, g, iv))
-            turn_joint(world, g, iq + 3, load3(world.qd, g, iv + 3), h)
+            x = load3(world.q, g, iq) + h * load3(world.qd, g, iv)
+            w = load3(world.qd, g, iv + 3)
+            t = tree.link_tumbler[i]
+            if t >= 0:
+                lag = world.lag[g, t]
+                apart = world.touched[g, i]
+                x = x + where_lt(apart, fill(MARGIN), zero3(), lag.v)
+                w = w - where_lt(apart, fill(MARGIN), zero3(), lag.w)
+            store3(world.q, g, iq, x)
+            turn_joint(world, g, iq + 3, w, h)
         elif joint == BALL:
             turn_joint(world, g, iq, load3(world.qd, g, iv), h)
         else:

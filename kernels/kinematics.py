@@ -89,16 +89,16 @@ def own_inertia(tree: Tree, world: World, g: int, i: int, com: Vec3) -> Inertia:
 
 
 @wp.func
-def inertias(tree: Tree, world: World, g: int):
+def inertias(tree: Tree, world: World, g: int, V: wp.array2d(dtype=Motion)):
     """Each link's own inertia I; its acceleration A were no joint to accelerate; and the force p that
-    A and its velocity ask for [2.72, 5.3], less gravity, about the link's origin."""
+    A and its velocity V ask for [2.72, 5.3], less gravity, about the link's origin."""
     gravity = vec3(tree.gravity)
     for i in range(1, tree.link_count + 1):
         parent = tree.link_parent[i]
         R = world.R[g, i]
         r = world.r[g, i]
-        w = world.V[g, i].w
-        w0 = world.V[g, parent].w
+        w = V[g, i].w
+        w0 = V[g, parent].w
         above = world.A[g, parent]
         A = Motion(above.w + cross(w0, w), above.v + cross(above.w, r) + cross(w0, cross(w0, r)))
         mass = world.mass_scale[g, i] * tree.link_mass[i]

@@ -86,7 +86,7 @@ def mass_matrix(tree: Tree, world: World, first: int, M: wp.array2d(dtype=Real))
     g = first + wp.tid()
     n = tree.dof_count
     kinematics(tree, world, g)
-    inertias(tree, world, g)
+    inertias(tree, world, g, world.V)
     for c in range(n * n):
         M[g, c] = fill(0.0)
     for c in range(tree.link_count):
@@ -117,7 +117,7 @@ def bias_force(tree: Tree, world: World, first: int, C: wp.array2d(dtype=Real)):
     Newton-Euler with no joint acceleration (RBDA table 5.1). External forces count in."""
     g = first + wp.tid()
     kinematics(tree, world, g)
-    inertias(tree, world, g)
+    inertias(tree, world, g, world.V)
     for c in range(tree.link_count):
         i = tree.link_count - c
         p = world.p[g, i]

@@ -18,14 +18,13 @@ from .strike import strike
 from .tree import CARRIED, COLUMNS, Tree, World  # noqa: F401
 from .watch import Watch, begin, look
 
-wp.set_module_options(
-    {
-        "enable_backward": False,
-        "max_unroll": 3,
-        "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512"
-        " -mllvm=-inline-threshold=9000",
-    }
-)
+OPTIONS = {
+    "enable_backward": False,
+    "max_unroll": 3,
+    "cpu_compiler_flags": "-march=native -ffp-contract=fast -mprefer-vector-width=512"
+    " -mllvm=-inline-threshold=9000",
+}
+wp.set_module_options(OPTIONS)
 
 
 def load(device) -> None:
@@ -34,15 +33,21 @@ def load(device) -> None:
 
 
 @wp.func
-def advance(tree: Tree, world: World, g: int):
+def start(tree: Tree, world: World, g: int):
+    """From the state to w, the velocity that all but contacts lead to."""
     kinematics(tree, world, g)
     trial = int(0)
     while trial < LAST_TRIAL:
         trial = trial + 1
-        inertias(tree, world, g)
+        inertias(tree, world, g, world.V)
         factorize(tree, world, g)
         if not judge_drives(tree, world, g, trial):
             trial = LAST_TRIAL
+
+
+@wp.func
+def finish(tree: Tree, world: World, g: int):
+    """From w to the end of the step: contacts, velocities, places."""
     find(tree, world, g)
     strike(tree, world, g)
     solve(tree, world, g)
@@ -50,6 +55,12 @@ def advance(tree: Tree, world: World, g: int):
     integrate(tree, world, g)
     if keep(tree, world, g):
         velocities(tree, world, g)
+
+
+@wp.func
+def advance(tree: Tree, world: World, g: int):
+    start(tree, world, g)
+    finish(tree, world, g)
 
 
 @wp.kernel
@@ -75,7 +86,7 @@ def run_kinematics(tree: Tree, world: World, first: int, count: int):
 def run_inertias(tree: Tree, world: World, first: int, count: int):
     g = first + wp.tid()
     for _k in range(count):
-        inertias(tree, world, g)
+        inertias(tree, world, g, world.V)
 
 
 @wp.kernel

@@ -40,6 +40,9 @@ class Tree:
     dof_count: int
     slot_count: int
     flyer_count: int
+    tumbler_count: int
+    loose: int
+    """1: some links are"""
     response_room: int
     """responses that `World.y` holds; what does not fit is worked out anew in each sweep"""
     sweeps: int
@@ -76,6 +79,15 @@ class Tree:
     link_near: wp.array(dtype=float)
     """ball: cosine of half the angle at which its limit is first looked at"""
     link_sprung: wp.array(dtype=int)
+
+    link_loose: wp.array(dtype=int)
+    """1: velocity-product forces at the mean velocity of the step (see `mean`)"""
+    link_tumbler: wp.array(dtype=int)
+    """its number among those, or -1"""
+    tumbler_link: wp.array(dtype=int)
+    """free links without children that turn unevenly (see `tumble`)"""
+    tumbler_inertia: wp.array(dtype=wp.mat33)
+    """about the centre of mass, link axes, over its trace"""
 
     dof_armature: wp.array(dtype=float)
     dof_damping: wp.array(dtype=float)
@@ -158,6 +170,11 @@ class World:
     V: wp.array2d(dtype=Motion)
     A: wp.array2d(dtype=Motion)
     """acceleration of a link whose joints, and those above it, do not accelerate"""
+    mean: wp.array2d(dtype=Motion)
+    """of V at the step's start and at its end"""
+    lag: wp.array2d(dtype=Motion)
+    """by what a step with its last velocity goes wrong of a tumbler: angular velocity too much, body axes
+    [rad/s], and way that is lacking [m]"""
     I: wp.array2d(dtype=Inertia)
     p: wp.array2d(dtype=Force)
 
@@ -196,7 +213,8 @@ class World:
     """slots in use by some lane of the group, each followed by its place in y; last, their number and
     the end of y"""
     touched: wp.array2d(dtype=Real)
-    """least distance of a flyer to anything but planes that it may come to within the step [m]"""
+    """least distance that a flyer or tumbler may come to anything within the step [m]; a flyer's planes
+    apart"""
     struck: wp.array2d(dtype=Real)
     """of the first link of a tree: what is left of the step when something strikes the tree; of link 0: the
     same of any tree [s]"""
@@ -215,6 +233,8 @@ COLUMNS = {
     "dof": "qd joint_f s U d w w_settled",
     "link": "mass_scale turn R pos r V A I p pull torque full touched struck",
     "flight": "knock",
+    "loose": "mean",
+    "tumbler": "lag",
     "slot": "gap point normal goal kept impulse settled change",
     "pair": "friction restitution",
     "body": "force",

@@ -12,6 +12,7 @@ from ...assets import path as asset
 from ..trees import below
 from .joints import DOF_SIZE, KINDS, Q_SIZE, Coordinates, Joint, Kind, coordinates
 from .load import read_model
+from .loose import loose_tables
 from .mjcf import ModelError, Shape
 from .pose import forward
 from .roles import Roles, find_roles
@@ -85,6 +86,7 @@ class Model:
             path, shown = asset("player.xml"), "player"
         model = Model(**read_model(path, shown, rigid, pose, without))
         model.tables["slot_flag"] = _flags(model)
+        model.tables |= loose_tables(model)
         return model
 
     def convert_q(self, other: Model, joint_q: np.ndarray) -> np.ndarray:

@@ -104,6 +104,8 @@ class Batch:
         tree.q_count, tree.dof_count = model.nq, model.nv
         tree.slot_count = len(model.tables.get("slot_kind", ()))
         tree.flyer_count = len(model.tables.get("flyer_link", ()))
+        tree.tumbler_count = len(model.tables["tumbler_link"])
+        tree.loose = int(model.tables["link_loose"].any())
         tree.forced = 0
         lengths = model.tables.get("slot_length", np.zeros(0, int))
         tree.response_room = int(min(RESPONSE_ROOM, lengths.sum() + program.HEAD * len(lengths)))
@@ -117,6 +119,8 @@ class Batch:
             "q": model.nq,
             "dof": model.nv,
             "link": tree.link_count + 1,
+            "loose": tree.loose * (tree.link_count + 1),
+            "tumbler": tree.tumbler_count,
             "flight": len(model.tables.get("flight_slot", ())),
             "slot": tree.slot_count,
             "pair": len(model.pairs),

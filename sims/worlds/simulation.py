@@ -255,7 +255,9 @@ class Simulation(Batch):
     def advancing(self, count: int, course: Any, watch: Any) -> Callable[[], None]:
         """What does the same along a `Course`, watched by a `Watch`, both of the kernels; to be called many
         times."""
-        launch = self.prepared(self._program, "step", [count, course, watch])
+        alone = self._tree.loose or self._tree.tumbler_count
+        program = self.program("loose") if alone else self._program
+        launch = self.prepared(program, "step", [count, course, watch])
 
         def advance() -> None:
             with self._changing():

@@ -68,10 +68,12 @@ class Drives:
 
 
 class Rigid:
-    """A model's dynamics. q as MuJoCo's qpos, v as its qvel."""
+    """A model's dynamics. q as MuJoCo's qpos, v as its qvel. mean (nv,): dofs of trees whose velocity-product
+    forces are those of the mean of the velocities before and after a step; of others, of those before."""
 
-    def __init__(self, m):
+    def __init__(self, m, mean=None):
         self.m = m
+        self.mean = np.zeros(m.nv, bool) if mean is None else mean
         self.gravity = m.opt.gravity.copy()
         self.links, self.body_link, self.body_X = [], [-1], [np.eye(6)]
         for b in range(1, m.nbody):
@@ -275,9 +277,10 @@ class Rigid:
                 f[link.dofs] += self.m.jnt_stiffness[link.joint] * self.away(link, q, self.m.qpos_spring)
         return f
 
-    def passive(self, q, v, h, joint_f=0.0, force=None):
-        """All but the drives at q, v: force, and the matrix that multiplies the change of v."""
-        p = self.pose(q, v)
+    def passive(self, q, v, h, joint_f=0.0, force=None, after=None):
+        """All but the drives at q, v: force, and the matrix that multiplies the change of v, which ends as
+        `after`."""
+        p = self.pose(q, v if after is None else np.where(self.mean, 0.5 * (v + after), v))
         damping = self.m.dof_damping
         f = joint_f - self.bias(p) - damping * v + self.spring(q, v, h)
         if force is not None:
@@ -288,14 +291,18 @@ class Rigid:
     def system(self, q, v, target, h, drives, joint_f=0.0, force=None):
         """Mh = M + armature + h kd + h^2 kp + ..., and the free velocity v* = v + Mh^-1 h f of the
         implicit step. Effort limits do not count."""
-        f, M = self.passive(q, v, h, joint_f, force)
-        Mh = M + np.diag(h * (drives.kd + h * drives.kp))
-        return Mh, v + np.linalg.solve(Mh, h * (f + self.pull(q, v, target, h, drives)))
+        after, change = v, np.inf
+        while change > 1e-9:
+            f, M = self.passive(q, v, h, joint_f, force, after)
+            Mh = M + np.diag(h * (drives.kd + h * drives.kp))
+            before, after = after, v + np.linalg.solve(Mh, h * (f + self.pull(q, v, target, h, drives)))
+            change = np.abs(after - before)[self.mean].max(initial=0.0)
+        return Mh, after
 
     def exerted(self, q, v, after, h, joint_f=0.0, force=None):
         """Torque that the drives have exerted in a step that led from v to `after`, by inverse dynamics,
         and what a relative error of 1e-6 in the velocities makes of it."""
-        f, M = self.passive(q, v, h, joint_f, force)
+        f, M = self.passive(q, v, h, joint_f, force, after)
         return M @ (after - v) / h - f, 1e-6 * np.abs(M) @ (np.abs(after) + np.abs(v)) / h
 
     def obeys_effort_limits(self, q, v, after, target, h, drives, joint_f=0.0, force=None):

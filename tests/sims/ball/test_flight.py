@@ -68,8 +68,7 @@ TUMBLER = (
 
 
 def test_momentum_of_one_body():
-    """Turning about a point off its centre of mass, a free body keeps its momentum but for a term in h."""
-    drift = []
+    """Turning about a point off its centre of mass, a free body keeps its momentum."""
     for h in (0.01, 0.005):
         model = scenes.scene(TUMBLER, h)
         sim = Simulation(model, 1)
@@ -84,10 +83,8 @@ def test_momentum_of_one_body():
         v, L = sim.body_qd[0, 0, :3].copy(), spin()
         sim.step(round(1 / h))
         assert com.any()
-        np.testing.assert_allclose(sim.body_qd[0, 0, :3], v + [0, 0, -9.81], atol=3 * h * 0.25 * np.sum(v**2))
-        drift.append(np.linalg.norm(spin() - L) / np.linalg.norm(L))
-    print("angular drift of a tumbling body in 1 s", drift)
-    assert drift[0] <= 2e-3 and first_order(drift)
+        np.testing.assert_allclose(sim.body_qd[0, 0, :3], v + [0, 0, -9.81], atol=1e-4)
+        np.testing.assert_allclose(spin(), L, atol=1e-4 * np.linalg.norm(L))
 
 
 def test_linear_momentum_of_a_ball_is_exact():
@@ -135,7 +132,7 @@ SPIN = np.array([1.0, 1.5, -1.0, -0.5, 1.0, 2.0, 1.0, -2.0, 1.0, 1.5])
 
 def test_energy():
     """A chain without gravity, drives and damping, turning at some 2 rad/s: in 5 s its energy leaves
-    its value by at most 15 % at 10 ms, in proportion to h."""
+    its value by at most 1.5 % at 10 ms, less with smaller steps."""
     drift = []
     for h in (0.01, 0.005, 0.0025):
         model, m = chain(h, "0 0 0")
@@ -149,7 +146,7 @@ def test_energy():
             sim.step(round(0.1 / h))
         drift.append(np.abs(np.array(energy) / energy[0] - 1).max())
     print("energy drift of a chain in 5 s", drift)
-    assert drift[0] <= 0.15 and first_order(drift)
+    assert drift[0] <= 0.015 and drift[1] <= 0.6 * drift[0]
 
 
 def test_pendulum_converges_with_h():

@@ -103,6 +103,29 @@ def test_equal_moments_any_axes(throws):
     np.testing.assert_allclose(after[:, :2], 0.6 * v, atol=1e-5)
 
 
+def energy(sim, height_of_com):
+    M, qd = sim.mass_matrix().astype(float), sim.joint_qd.astype(float)
+    mass = M[:, 0, 0]
+    return 0.5 * np.einsum("ni,nij,nj->n", qd, M, qd) + mass * GRAVITY * height_of_com(sim)
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.5, 2.0])
+def test_energy_never_grows(model, friction):
+    """Thrown with spin, ten bounces. A step's velocity lags by g h / 2, which is m v g h / 2 of energy."""
+    random = np.random.default_rng(8)
+    sim = Simulation(model, 32)
+    q, qd = np.zeros((32, 7)), random.standard_normal((32, 6)) * [1, 1, 1, 8, 8, 8]
+    q[:, 2], q[:, 3:] = 1.0, Rotation.random(32, rng=random).as_quat()
+    sim.reset(joint_q=q, joint_qd=qd)
+    sim.set_contact("ball", "ground", friction=friction)
+    least = first = energy(sim, lambda sim: sim.joint_q[:, 2])
+    for _ in range(400):
+        sim.step()
+        now = energy(sim, lambda sim: sim.joint_q[:, 2] - 0.005 * sim.joint_qd[:, 2])
+        assert (now <= least + 0.01 * first).all()
+        least = np.minimum(least, now)
+
+
 @pytest.mark.parametrize(
     "made",
     [
