@@ -86,8 +86,9 @@ def judge(tree: Tree, world: World, g: int, i: int, v: Vec3, trial: int) -> Real
     now = where_lt(limit, length, where_lt(half, was, stays, one), zero)
     if trial == LAST_TRIAL:
         now = min(now, was)
+    turns = where_lt(half, now, where_lt(was, half, one, zero), zero)
     aim = (limit / max(length, fill(1.0e-20))) * end
-    world.torque[g, i] = where_lt(half, now, aim, world.torque[g, i])
+    world.torque[g, i] = where_lt(zero, turns, aim, world.torque[g, i])
     world.full[g, i] = now
     return abs(now - was)
 

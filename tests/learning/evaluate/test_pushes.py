@@ -86,9 +86,9 @@ def test_pushes_come_from_where_they_should(pushed, graph):
 
 
 @pytest.mark.parametrize(("row", "share"), [(3, 1.0), (40, 0.5)], ids=["before", "after"])
-def test_only_falls_after_the_push_count(pushed, graph, row, share):
+def test_only_falls_after_the_push_count(pushed, standing, row, share):
     """World 0 falls, world 8, pushed in the same direction, does not."""
-    worlds, calls = pushed(16), []
+    worlds, calls = pushed(16, graph=standing), []
     judge = worlds.judge
 
     def falls(k):
@@ -98,7 +98,7 @@ def test_only_falls_after_the_push_count(pushed, graph, row, share):
         return E, down
 
     worlds.judge = falls
-    shares = push_survival(worlds, open_loop(worlds), reference_starts(graph), 10.0)
+    shares = push_survival(worlds, open_loop(worlds), reference_starts(standing), 10.0)
     np.testing.assert_array_equal(shares, [share, *np.ones(len(DIRECTIONS) - 1)])
     on = np.array([np.any(force[8]) for force, _ in worlds.forces])
     assert 3 < np.argmax(on) < 40
@@ -118,9 +118,9 @@ def test_the_largest_push_is_the_last_before_the_first_that_is_lost(task, graph,
     assert seen == [(1, " of 10 N"), (2, " of 20 N"), (3, " of 30 N")]
 
 
-def test_a_world_that_breaks_is_not_pushed(pushed, graph):
+def test_a_world_that_breaks_is_not_pushed(pushed, standing):
     """It fell before its push, so nothing is known of it; the others are pushed as ever."""
-    worlds = pushed(16)
+    worlds = pushed(16, graph=standing)
     step = worlds.course.step
 
     def breaks(count, rows):
@@ -129,15 +129,15 @@ def test_a_world_that_breaks_is_not_pushed(pushed, graph):
         step(count, rows)
 
     worlds.course.step = breaks
-    shares = push_survival(worlds, open_loop(worlds), reference_starts(graph), 10.0)
+    shares = push_survival(worlds, open_loop(worlds), reference_starts(standing), 10.0)
     np.testing.assert_array_equal(shares, np.ones(len(DIRECTIONS)))  # world 8 stands for the direction
     assert not any(np.any(force[0]) for force, _ in worlds.forces)
     assert any(np.any(force[8]) for force, _ in worlds.forces)
 
 
-def test_a_direction_in_which_nobody_stood_to_be_pushed(pushed, graph):
+def test_a_direction_in_which_nobody_stood_to_be_pushed(pushed, standing):
     """Nothing is known of it."""
-    worlds, calls = pushed(16), []
+    worlds, calls = pushed(16, graph=standing), []
     judge = worlds.judge
 
     def falls(k):
@@ -147,5 +147,5 @@ def test_a_direction_in_which_nobody_stood_to_be_pushed(pushed, graph):
         return E, down
 
     worlds.judge = falls
-    shares = push_survival(worlds, open_loop(worlds), reference_starts(graph), 10.0)
+    shares = push_survival(worlds, open_loop(worlds), reference_starts(standing), 10.0)
     np.testing.assert_array_equal(shares, [1.0, 1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 1.0])

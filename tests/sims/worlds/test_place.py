@@ -315,7 +315,7 @@ def test_ten_of_a_thousand_worlds_are_placed_in_one_launch(player, launched):
     launched.clear()
     sim.reset(some)
     assert launched == ["place"]
-    np.testing.assert_array_equal(sim.joint_q[some], np.tile(player.start_q.astype(np.float32), (10, 1)))
+    np.testing.assert_allclose(sim.joint_q[some], np.tile(player.start_q, (10, 1)), atol=1e-6)
     np.testing.assert_array_equal(sim.joint_q[others], before[others])
 
     in_place = np.arange(1024)

@@ -147,7 +147,7 @@ def test_a_table_of_pushes(run, capsys, monkeypatch):
 def test_an_evaluation_to_read(run, capsys):
     assert main(["evaluate", str(run), "--cycles", "0.5", "--trials", "4"]) == 0
     said = capsys.readouterr().out
-    assert "survived  " in said and "drift     - and - a cycle" in said
+    assert "survived  " in said and "way       - of the reference's pace, - off it" in said
 
 
 def test_an_export_is_a_valid_take_of_a_player_that_stands(run, capsys, tmp_path):

@@ -24,6 +24,9 @@ def run(skill, seed, **values):
         "ends": 2.0,
         "drift": 3.0,
         "turn": 4.0,
+        "pace": 99.0,
+        "astray": 5.0,
+        "landing": 3.0,
         "open angle": 5.0,
         "open ends": 6.0,
         "open seconds": 0.7,
@@ -38,7 +41,7 @@ def test_seeds_share_a_row():
     rows = [line for line in text.splitlines() if line.startswith(("| walk", "| jog"))]
     assert rows[0] == "| walk: walking | 1.00 | 100 99 98 | 90 91 92 | 110 | 150 k | 40 % |"
     assert rows[1].split(" | ")[2] == "7"
-    assert rows[2] == "| walk | 2.0 | 2.0 | 3.0 | 4.0 | 5.0 | 6.0 | 0.7 |"
+    assert rows[2] == "| walk | 2.0 | 2.0 | 3.0 | 99.0 | 5.0 | 3.0 | 5.0 | 6.0 | 0.7 |"
     assert rows[4] == f"| walk | {' | '.join(['100'] * 7)} | 200 |"
 
 
