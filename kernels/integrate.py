@@ -30,6 +30,8 @@ def integrate(tree: Tree, world: World, g: int):
                 x = x + where_lt(apart, fill(MARGIN), zero3(), lag.v)
                 w = w - where_lt(apart, fill(MARGIN), zero3(), lag.w)
             store3(world.q, g, iq, x)
+            away = max(abs(x.x), max(abs(x.y), abs(x.z)))
+            world.strayed[g, 0] = where_lt(fill(tree.far), away, fill(1.0), world.strayed[g, 0])
             turn_joint(world, g, iq + 3, w, h)
         elif joint == BALL:
             turn_joint(world, g, iq, load3(world.qd, g, iv), h)

@@ -185,7 +185,11 @@ def ballistic(
 def flags(world: World, g: int) -> Real:
     """Bits of the status, as a number."""
     return (
-        world.broken[g, 0] + 2.0 * world.fallen[g, 0] + 4.0 * world.fumbled[g, 0] + 8.0 * world.hurried[g, 0]
+        world.broken[g, 0]
+        + 2.0 * world.fallen[g, 0]
+        + 4.0 * world.fumbled[g, 0]
+        + 8.0 * world.hurried[g, 0]
+        + 16.0 * world.strayed[g, 0]
     )
 
 

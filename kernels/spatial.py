@@ -1,9 +1,9 @@
 """Vectors, rotations and spatial quantities over `Real`, in Featherstone's letters.
 
 Everything is expressed along the axes of the world. A spatial quantity of a link is taken about that
-link's own origin, so that float32 holds however far the character walks; `shift_*` moves one from a
-link to its parent. Numbers in brackets are equations of Featherstone, *Rigid Body Dynamics
-Algorithms* (2008).
+link's own origin, so that float32 tells it as well far from the world's (a place it does not, see
+`Tree.far`); `shift_*` moves one from a link to its parent. Numbers in brackets are equations of
+Featherstone, *Rigid Body Dynamics Algorithms* (2008).
 
 | letter | type | meaning |
 |---|---|---|

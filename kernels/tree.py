@@ -34,6 +34,8 @@ class Tree:
     gravity: wp.vec3
     max_speed: float
     """no joint turns faster [rad/s]"""
+    far: float
+    """a free joint beyond this is too far for single precision [m]"""
     link_count: int
     """links, the ground not counted"""
     q_count: int
@@ -225,7 +227,8 @@ class World:
     fallen: wp.array2d(dtype=Real)
     fumbled: wp.array2d(dtype=Real)
     hurried: wp.array2d(dtype=Real)
-    """status flags: the state is not finite, a fall, a bad contact, a joint at max_speed"""
+    strayed: wp.array2d(dtype=Real)
+    """status flags: the state is not finite, a fall, a bad contact, a joint at max_speed, one beyond `far`"""
 
 
 COLUMNS = {
@@ -238,10 +241,13 @@ COLUMNS = {
     "slot": "gap point normal goal kept impulse settled change",
     "pair": "friction restitution",
     "body": "force",
-    "world": "broken fallen fumbled hurried",
+    "world": "broken fallen fumbled hurried strayed",
     "response": "y",
     "use": "active",
 }
 """What the columns of a `World`'s arrays are: a joint coordinate each, a degree of freedom, ..."""
-CARRIED = ("q", "qd", "impulse", "knock", "full", "torque", "broken", "fallen", "fumbled", "hurried")
+CARRIED = (
+    *("q", "qd", "impulse", "knock", "full", "torque"),
+    *("broken", "fallen", "fumbled", "hurried", "strayed"),
+)
 """Arrays that a step hands to the next."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .worlds import (
         BAD_CONTACT,
         FALL,
+        FAR,
         NONFINITE,
         OVERSPEED,
         Contacts,
@@ -33,6 +34,7 @@ __all__ = [
     "AUTHORED",
     "BAD_CONTACT",
     "FALL",
+    "FAR",
     "NONFINITE",
     "OVERSPEED",
     "Ball",
@@ -70,6 +72,6 @@ __getattr__, __dir__ = lazily(
         ".reference": "Cycle Reference close_cycle mirrored",
         ".retarget": "MappingError find_mapping read_mapping retargeted",
         ".worlds": "Simulation Contacts State Course Probe Watch "
-        "terms watch NONFINITE FALL BAD_CONTACT OVERSPEED",
+        "terms watch NONFINITE FALL BAD_CONTACT OVERSPEED FAR",
     },
 )

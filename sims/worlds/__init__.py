@@ -8,13 +8,14 @@ if TYPE_CHECKING:
     from .course import Course, Signal
     from .places import Place
     from .probe import Group, Probe
-    from .simulation import BAD_CONTACT, FALL, NONFINITE, OVERSPEED, Contacts, Simulation
+    from .simulation import BAD_CONTACT, FALL, FAR, NONFINITE, OVERSPEED, Contacts, Simulation
     from .state import State
     from .watch import Watch
 
 __all__ = [
     "BAD_CONTACT",
     "FALL",
+    "FAR",
     "NONFINITE",
     "OVERSPEED",
     "Contacts",
@@ -34,7 +35,7 @@ __getattr__, __dir__ = lazily(
         ".course": "Course Signal",
         ".places": "Place",
         ".probe": "Probe Group",
-        ".simulation": "Simulation Contacts NONFINITE FALL BAD_CONTACT OVERSPEED",
+        ".simulation": "Simulation Contacts NONFINITE FALL BAD_CONTACT OVERSPEED FAR",
         ".state": "State",
         ".watch": "Watch",
     },

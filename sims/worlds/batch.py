@@ -22,6 +22,11 @@ RESPONSE_ROOM = 1130
 """Entries of 12 bytes for the responses of touching slots in each world; see `kernels.contact`."""
 
 
+SLOW = 0.01
+"""Places are too far where a step at this speed [m/s] may be less than half of what single precision tells
+apart."""
+
+
 def widest_lanes() -> int:
     """Worlds that one vector register of this processor holds."""
     machine = platform.machine().lower()
@@ -99,6 +104,7 @@ class Batch:
                 rows = np.asarray(rows, np.int32 if var.type.dtype is wp.int32 else np.float32)
                 setattr(tree, name, wp.array(rows, dtype=var.type.dtype, device=self.device))
         tree.h = model.timestep
+        tree.far = SLOW * tree.h * 2.0**24
         tree.gravity = wp.vec3(*model.tables["gravity"])
         tree.link_count = len(model.tables["link_parent"]) - 1
         tree.q_count, tree.dof_count = model.nq, model.nv

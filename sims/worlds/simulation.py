@@ -21,7 +21,7 @@ SWEEPS = 6
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
 
-NONFINITE, FALL, BAD_CONTACT, OVERSPEED = 1, 2, 4, 8
+NONFINITE, FALL, BAD_CONTACT, OVERSPEED, FAR = 1, 2, 4, 8, 16
 """Bits of `Simulation.status`."""
 
 PORTS = {"joint_q": "q", "joint_qd": "qd", "joint_target_q": "target", "joint_f": "joint_f"}
@@ -319,8 +319,15 @@ class Simulation(Batch):
     def status(self) -> np.ndarray:
         """(world_count,) bit mask since the last reset: `NONFINITE`, `FALL` (a part of the player other
         than its feet touched the ground), `BAD_CONTACT` (the ball touched it elsewhere than on a hand),
-        `OVERSPEED` (a joint was held back to `max_speed`)"""
-        flags = {"broken": NONFINITE, "fallen": FALL, "fumbled": BAD_CONTACT, "hurried": OVERSPEED}
+        `OVERSPEED` (a joint was held back to `max_speed`), `FAR` (a free joint was so far from the origin,
+        1.7 km at 10 ms, that single precision loses slow motion)"""
+        flags = {
+            "broken": NONFINITE,
+            "fallen": FALL,
+            "fumbled": BAD_CONTACT,
+            "hurried": OVERSPEED,
+            "strayed": FAR,
+        }
         bits = [
             bit * (self._read(getattr(self._world, name))[:, 0] > 0).astype(np.int32)
             for name, bit in flags.items()

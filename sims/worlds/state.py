@@ -23,6 +23,7 @@ QUANTITIES = {
     "fallen": "fallen",
     "fumbled": "fumbled",
     "hurried": "hurried",
+    "strayed": "strayed",
 }
 """Public name -> array of the kernels' `World`: coordinates, velocities, what the contacts and drives at
 their limits start the next step from, and the status."""

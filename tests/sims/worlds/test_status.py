@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from tests.reference.scenes import ball, scene, start
 from warpdribble.sims import Model, Simulation
-from warpdribble.sims.worlds.simulation import BAD_CONTACT, FALL, NONFINITE
+from warpdribble.sims.worlds.simulation import BAD_CONTACT, FALL, FAR, NONFINITE
 
 SICK = 3
 OTHERS = [k for k in range(8) if k != SICK]
@@ -150,3 +151,23 @@ def test_reset_clears_the_bounce_impulse(model):
         pytest.fail("no bounce")
     sim.reset()
     assert not sim.contacts().impulse.any()
+
+
+def test_too_far_for_slow_motion():
+    """Beyond 2^24 h 1 cm/s, 1.7 km at 10 ms; nearer, a body at 1 cm/s goes on."""
+    model = scene(ball(), 0.01, gravity="0 0 0")
+    away = np.array([0.0, -1000.0, 1600.0, 1700.0, -2100.0])
+    sim = Simulation(model, len(away))
+    q = start(model, len(away))
+    for axis in range(3):
+        q[:, :3] = 0.0
+        q[:, axis] = away
+        qd = np.zeros(6)
+        qd[axis] = 0.01
+        sim.reset(joint_q=q, joint_qd=qd)
+        assert not sim.status.any()
+        sim.step(100)
+        assert sim.status.tolist() == [0, 0, 0, FAR, FAR]
+        assert ((sim.joint_q[:3, axis] - away[:3]) > 0.007).all()
+        sim.step(1)
+        assert sim.joint_q[4, axis] == away[4]  # as it says
