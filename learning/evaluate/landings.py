@@ -45,12 +45,12 @@ def land(task: Follow, controller: Controller, starts: Starts, fragments: int) -
     sides = [model.descendants(model.body(foot)) for foot in model.roles.feet]
     begin = Starts(*(np.repeat(part[:1], task.worlds, axis=0) for part in vars(starts).values()))
     of = {shape.name: shape.body for shape in model.shapes}
+    slots = [{of[a], of[b]} for a, b in sim.contacts().shapes]
+    mine = np.array([[bool(bodies & set(side)) for bodies in slots] for side in sides])
     weight = model.body_mass.sum() * np.linalg.norm(model.gravity) * model.timestep
     forces = []
     for _ in Rollout(task, controller, Ahead(), begin).steps(fragments):
         seen = sim.contacts()
-        up = seen.impulse[0, :, 0] * seen.normal[0, :, 2] / weight
-        bodies = [{of[name] for name in pair} for pair in seen.shapes]
-        forces.append([sum(up[i] for i, b in enumerate(bodies) if b & set(side)) for side in sides])
+        forces.append(mine @ (seen.impulse[0, :, 0] * seen.normal[0, :, 2] / weight))
     settled = int(SETTLE / model.timestep)
     return Landings(np.array(forces)[settled:], model.timestep)

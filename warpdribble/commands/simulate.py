@@ -43,7 +43,8 @@ class Simulate(ClipInput, Outputs):
     ball: bool = True
     """The ball, as it was recorded, or inferred from the hands where it was not; --no-ball leaves it out."""
     root: Literal["free", "tracked"] = "free"
-    """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too."""
+    """free: only the joints are driven. tracked: virtual forces hold the pelvis to the clip too, and
+    the joints' targets are learned by trying."""
     model: str = "player"
     """The player, or the path of an MJCF file with the same body names."""
 
@@ -69,9 +70,10 @@ class Simulate(ClipInput, Outputs):
         model, reference = self._without_ball(model, one, reference)
         tries = TRIES if one.ball is not None and reference.duration < SHORT else 1
         with compiling():
-            warmed(follow(model, reference, 1, "free", self.device))
-        with bar("finding targets", refine.TRIES if self.root == "tracked" else 0) as progress:
-            task = follow(model, reference, tries, self.root, self.device, progress)
+            task = warmed(follow(model, reference, tries, "free", self.device))
+        if self.root == "tracked":
+            with bar("finding targets", refine.TRIES) as progress:
+                task = follow(model, reference, tries, "tracked", self.device, progress)
         begin = starts(model, reference, tries, one.ball is not None)
         seen = _record(task, OpenLoop(), begin).first(reference.frame_count)
         write_outputs(self, model, seen, say_trajectory(model, seen, self.root), _title(one), self.root)
