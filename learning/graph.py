@@ -14,6 +14,7 @@ from ..sims.reference.feedforward import leading_targets
 from ..sims.reference.reference import Cycle, Reference, resample_q
 
 if TYPE_CHECKING:
+    from ..sims.ball import Ball
     from ..sims.model import Model
 
 STEPS = 5
@@ -60,6 +61,13 @@ class ControlGraph:
     """What it is made of; one of all fragments where nothing is said."""
     motion: np.ndarray | None = None
     """(fragments * STEPS, nq) the reference after each time step; None in graphs of older files"""
+    touch: np.ndarray | None = None
+    """(fragments * STEPS, 2) bool: the left, the right hand should have the ball after each time step, H of
+    P1 5.1; None where nobody plays with one"""
+    checkpoints: np.ndarray | None = None
+    """(n,) rows of `touch` after which a hand must have the ball, in order"""
+    heights: np.ndarray | None = None
+    """(n,) [m] that the ball must reach at each of them, h_ref of Eq. 8"""
 
     def __post_init__(self) -> None:
         edges = np.asarray(self.edges, int).reshape(-1, 2)
@@ -131,26 +139,49 @@ class ControlGraph:
         spans = tuple(Span(str(n), int(a), int(b)) for n, a, b in values.pop("spans", ()))
         return ControlGraph(**values, spans=spans)
 
+    def on(self, model: Model, other: Model) -> ControlGraph:
+        """The same, made for another model, on this one, whose joints it has."""
+        speed = np.concatenate([np.arange(other.nv)[other.dof_slice(name)] for name in model.joint_names])
+        return replace(
+            self,
+            **{
+                name: model.convert_q(other, value)
+                for name in ("targets", "start_q", "goal_q", "motion")
+                if (value := getattr(self, name)) is not None
+            },
+            start_qd=self.start_qd[:, speed],
+            goal_qd=self.goal_qd[:, speed],
+        )
+
 
 def clip_graph(
-    model: Model, reference: Reference, feet: Sequence[str], root_lead: float = 0.0
+    model: Model,
+    reference: Reference,
+    feet: Sequence[str],
+    root_lead: float = 0.0,
+    ball: Ball | None = None,
 ) -> ControlGraph:
     """A reference from its first row to its last, as fragments one after the other; the last follows itself.
-    What is missing to a whole fragment is held still. feet, root_lead: see `leading_targets`."""
+    What is missing to a whole fragment is held still. feet, root_lead: see `leading_targets`. ball: who plays
+    with it when."""
     rows = reference.frame_count - 1
     count = max(1, -(-rows // STEPS))
     held = np.minimum(np.arange(count * STEPS + 1), rows)
     speed = _central_velocity(model, reference)[held]
     joint_q = reference.joint_q[held]
     targets = leading_targets(model, reference, feet, root_lead)[held]
-    return _graph(joint_q, speed, targets, reference.timestep, np.minimum(np.arange(count) + 1, count - 1))
+    after = np.minimum(np.arange(count) + 1, count - 1)
+    graph = _graph(joint_q, speed, targets, reference.timestep, after)
+    return graph if ball is None else _played(graph, ball, held[1:], rows)
 
 
-def cyclic_graph(model: Model, cycle: Cycle, feet: Sequence[str], name: str = "") -> ControlGraph:
+def cyclic_graph(
+    model: Model, cycle: Cycle, feet: Sequence[str], name: str = "", ball: Ball | None = None
+) -> ControlGraph:
     """The smallest graph, a cycle whose last fragment leads to the first.
 
     The cycle's time is stretched to whole fragments. feet: bodies that carry it; see `leading_targets`.
-    name: of its span.
+    name: of its span. ball: who plays with it when.
     Raises ValueError for a cycle too short to be cut.
     """
     rows = cycle.reference.frame_count - 1
@@ -168,7 +199,20 @@ def cyclic_graph(model: Model, cycle: Cycle, feet: Sequence[str], name: str = ""
     graph = _graph(
         several.joint_q[middle], speed, targets, fitted.timestep, (np.arange(count) + 1) % count, name
     )
-    return replace(graph, stretch=count * STEPS / rows)
+    graph = replace(graph, stretch=count * STEPS / rows)
+    return graph if ball is None else _played(graph, ball, at[1:], rows)
+
+
+def _played(graph: ControlGraph, ball: Ball, at: np.ndarray, rows: int) -> ControlGraph:
+    """The same with a ball, given at rows 0 to `rows` of the reference; at: where in it, in rows, the graph's
+    time steps end. A checkpoint at the reference's first row is at the last time step of a cycle."""
+    row = np.clip(np.searchsorted(at, ball.checkpoints), 0, len(at) - 1).astype(int)
+    row[np.asarray(ball.checkpoints) == 0] = len(at) - 1
+    touch = ball.touch[np.minimum(np.round(at).astype(int), rows)].copy()
+    for checkpoint, place in zip(ball.checkpoints, row):
+        touch[place] |= ball.touch[checkpoint]
+    order = np.argsort(row, kind="stable")
+    return replace(graph, touch=touch, checkpoints=row[order], heights=np.asarray(ball.heights, float)[order])
 
 
 def _graph(
@@ -209,7 +253,13 @@ def joined(graphs: Sequence[ControlGraph], transitions: Sequence[Transition]) ->
     arrays = ["targets", "start_q", "start_qd", "goal_q", "goal_qd"]
     if all(g.motion is not None for g in graphs):
         arrays.append("motion")
+    played: dict[str, np.ndarray] = {}
+    if all(g.touch is not None for g in graphs):
+        arrays += ["touch", "heights"]
+        marks = [np.asarray(g.checkpoints) + STEPS * at for g, at in zip(graphs, first)]
+        played["checkpoints"] = np.concatenate(marks)
     return ControlGraph(
+        **played,
         **{name: np.concatenate([getattr(g, name) for g in graphs]) for name in arrays},
         edges=np.concatenate([*edges, np.array(between, int).reshape(-1, 2)]),
         timestep=graphs[0].timestep,

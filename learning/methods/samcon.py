@@ -28,7 +28,7 @@ from ..rollout import Rollout
 from ..runs.stage import Context, Report, Stage
 from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
-from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, locomotion_model
+from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, legs_graph, locomotion_model
 from ..workers import Workers, shares
 
 RECORD_EVERY = 5
@@ -434,18 +434,18 @@ def make(context: Context) -> Samcon:
     c: SamconConfig = context.config
     model, count = locomotion_model(), max(1, min(context.workers, c.islands))
     threads = None if count == 1 else max(1, (os.cpu_count() or 1) // count)
+    graph = legs_graph(context.graph)
 
     def task(worlds: int) -> Locomotion:
-        return Locomotion(model, context.graph, worlds, context.device, threads, c.weights)
+        return Locomotion(model, graph, worlds, context.device, threads, c.weights)
 
     tasks = [task(c.particles * islands) for islands in shares(c.islands, count)]
     return Samcon(tasks, [task(c.trials) for _ in range(min(count, TRIED))], c, context.seed)
 
 
 def locomotion_task(context: Context, worlds: int) -> Locomotion:
-    return Locomotion(
-        locomotion_model(), context.graph, worlds, context.device, weights=context.config.weights
-    )
+    graph = legs_graph(context.graph)
+    return Locomotion(locomotion_model(), graph, worlds, context.device, weights=context.config.weights)
 
 
 def learned(context: Context, arrays: dict[str, np.ndarray]) -> LinearPolicy:

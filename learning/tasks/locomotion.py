@@ -54,6 +54,12 @@ def locomotion_model() -> Model:
     return Model.load("player", rigid=FINGERS, without=("ball",))
 
 
+def legs_graph(graph: ControlGraph) -> ControlGraph:
+    """A graph of the player for `locomotion_model`; one that is for it already stays as it is."""
+    player, model = Model.load("player"), locomotion_model()
+    return graph.on(model, player) if graph.start_q.shape[1] == player.nq else graph
+
+
 class Locomotion(Follow):
     """A player that keeps its balance along a control graph.
 

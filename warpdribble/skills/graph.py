@@ -1,4 +1,4 @@
-"""From a skill to what is learned: a control graph of the player without a ball."""
+"""From a skill to what is learned: a control graph of the player and the ball."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from ..assets import path as asset
 from ..learning.graph import ControlGraph, cyclic_graph
-from ..learning.tasks.locomotion import locomotion_model
+from ..learning.tasks.fingers import with_ready_hands
 from ..sims.errors import InputError
 from ..sims.model import Model
 from .skill import Skill
@@ -39,11 +39,13 @@ def skill_text(skill: Skill) -> str:
 def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGraph, tuple[str, ...]]:
     """The graph of a cyclic skill, and notes on it. data: folder of recordings, None for the usual one.
     Raises InputError."""
-    player, model = Model.load("player"), locomotion_model()
+    player = Model.load("player")
     one = stage_skill(player, skill, data)
     if one.cycle is None:
         reason = f"the skill '{skill.name}' is not cyclic: locomotion is learned on cycles"
         raise InputError(reason, hint="cyclic")
-    joint_q = model.convert_q(player, one.cycle.reference.joint_q)
-    cycle = replace(one.cycle, reference=replace(one.cycle.reference, joint_q=joint_q))
-    return cyclic_graph(model, cycle, model.roles.both("feet"), skill.name), one.notes
+    cycle = one.cycle
+    if one.ball is not None:
+        joint_q = with_ready_hands(player, cycle.reference.joint_q, one.ball.touch.any(axis=0))
+        cycle = replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
+    return cyclic_graph(player, cycle, player.roles.both("feet"), skill.name, one.ball), one.notes
