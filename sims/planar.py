@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -55,13 +57,21 @@ def over_ground(poses: ArrayLike, pivot: np.ndarray, place: np.ndarray, turn: fl
 
 
 def turned(
-    joint_q: np.ndarray, joint_qd: np.ndarray, by: np.ndarray, place: np.ndarray
+    joint_q: np.ndarray,
+    joint_qd: np.ndarray,
+    by: np.ndarray,
+    place: np.ndarray,
+    along: Sequence[tuple[int, int]] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """States (n, nq) and (n, nv) whose first joint is free, each turned by an angle (n,) [rad] about the
-    vertical, and put at a place (n, 2) [m] on the ground."""
+    vertical, and put at a place (n, 2) [m] on the ground. along: where the coordinates and the velocities
+    of other free joints begin that go with it, as a ball's."""
     joint_q, joint_qd = np.array(joint_q, float), np.array(joint_qd, float)
     turn = Rotation.from_rotvec(np.multiply.outer(by, [0.0, 0.0, 1.0]))
-    joint_q[:, :2] = place
-    joint_q[:, 3:7] = (turn * Rotation.from_quat(joint_q[:, 3:7])).as_quat()
-    joint_qd[:, :3] = turn.apply(joint_qd[:, :3])
+    was = joint_q[:, :2].copy()
+    for q, qd in ((0, 0), *along):
+        off = joint_q[:, q : q + 3] - np.pad(was, ((0, 0), (0, 1)))
+        joint_q[:, q : q + 3] = turn.apply(off) + np.pad(np.broadcast_to(place, was.shape), ((0, 0), (0, 1)))
+        joint_q[:, q + 3 : q + 7] = (turn * Rotation.from_quat(joint_q[:, q + 3 : q + 7])).as_quat()
+        joint_qd[:, qd : qd + 3] = turn.apply(joint_qd[:, qd : qd + 3])
     return joint_q, joint_qd

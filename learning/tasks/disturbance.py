@@ -52,7 +52,7 @@ class Disturber:
         what, streams, period = self.what, self.streams, task.graph.period
         if not (what.push or what.hands or what.arms):
             return
-        even, normal = streams.uniform(6), streams.normal(6 + task.course.columns - task.actions)
+        even, normal = streams.uniform(6), streams.normal(6 + task.others.shape[1])
         if what.push:
             self._push(even[:, :3], period)
         if what.hands:
@@ -60,7 +60,7 @@ class Disturber:
         if what.push or what.hands:
             task.course.push[:] = streams.worlds(self._forces)
         if what.arms:
-            task.course.offset[:, task.actions :] = streams.worlds(what.arms * normal[:, 6:])
+            task.others[:] = streams.worlds(what.arms * normal[:, 6:])
 
     def _push(self, drawn: np.ndarray, period: float) -> None:
         """drawn (count, 3): whether a push begins, from where, how hard."""

@@ -17,8 +17,8 @@ READY = 0.2
 
 
 def finger_signals(model: Model) -> tuple[Signal, ...]:
-    """A column of offsets for each finger, the left hand's first: 1 leads from flat to fist (Eq. 1). Joints of
-    a finger are told by their names, which begin with the side and the finger.
+    """A column of offsets for each finger, the left hand's first: 1 leads from flat to fist (Eq. 1). A
+    finger's joints are told by their names, which begin with the side and the finger.
     Raises ValueError for a model without the keyframes "flat" and "fist", or without fingers."""
     flat, fist = (_keyframe(model, name) for name in ("flat", "fist"))
     found: list[Signal] = []
@@ -33,9 +33,9 @@ def finger_signals(model: Model) -> tuple[Signal, ...]:
 
 def finger_joints(model: Model) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The joints of the left and of the right hand's fingers."""
-    names = [list(signal) for signal in finger_signals(model)]
-    half = len(FINGERS)
-    return tuple(sum(names[:half], [])), tuple(sum(names[half:], []))
+    signals, half = finger_signals(model), len(FINGERS)
+    left, right = (tuple(name for s in part for name in s) for part in (signals[:half], signals[half:]))
+    return left, right
 
 
 def with_ready_hands(model: Model, joint_q: np.ndarray, plays: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from ...sims.model import Model
-from ...sims.worlds import NONFINITE, Course, Signal, Simulation, State
+from ...sims.worlds import NONFINITE, Course, Signal, Simulation, State, Watch
 from ..graph import STEPS, ControlGraph
 from ..starts import Starts
 
@@ -37,6 +37,8 @@ class Follow:
         self.model, self.graph, self.worlds = model, graph, worlds
         self.sim = Simulation(model, worlds, device, threads)
         self.course = Course(self.sim, graph.targets, steered, pushed)
+        self.watch: Watch | None = None
+        """what looks into the fragments"""
         self.samples = 0
         """fragments simulated"""
         self.simulating = 0.0
@@ -56,8 +58,8 @@ class Follow:
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         """Simulate steps first ... first + count - 1 of fragments k (worlds,)."""
         began = time.perf_counter()
-        self.course.offset[:, : self.actions] = action
-        self.course.step(count, k * STEPS + first)
+        self.course.offset[:, : action.shape[1]] = action
+        self.course.step(count, k * STEPS + first, self.watch)
         wp.synchronize_device(self.sim.device)
         self.simulating += time.perf_counter() - began
         self.samples += self.worlds if first + count == STEPS else 0
@@ -74,7 +76,12 @@ class Follow:
     def calm(self) -> None:
         """End all disturbances."""
         self.course.calm()
-        self.course.offset[:, self.actions :] = 0.0
+        self.others[:] = 0.0
+
+    @property
+    def others(self) -> np.ndarray:
+        """(worlds, n) live offsets of what is steered, but not by this task's actions."""
+        return self.course.offset[:, self.actions :]
 
 
 class OpenLoop:

@@ -3,14 +3,14 @@ the state and the cost of Liu et al. 2016)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...sims.model import Model
 from ...sims.planar import heading, turned, wrapped
-from ...sims.worlds import FALL, NONFINITE, Group, Probe, terms
+from ...sims.worlds import FALL, NONFINITE, Group, Probe, Signal, terms
 from ..graph import STEPS, ControlGraph
 from ..starts import Starts
 from .follow import Follow
@@ -71,6 +71,8 @@ class Locomotion(Follow):
     reference begins the fragment, so its heading says how far it is off.
     """
 
+    # signals, more: what is steered and observed beyond that, for a task that is made of this one
+
     def __init__(
         self,
         model: Model,
@@ -79,20 +81,22 @@ class Locomotion(Follow):
         device: str = "cpu",
         threads: int | None = None,
         weights: CostWeights = WEIGHTS,
+        signals: Sequence[Signal] = (),
+        more: Mapping[str, terms.Term] | None = None,
     ):
         roles = model.roles
         hips, knees, ankles, toes = (roles.both(part) for part in ("hips", "knees", "ankles", "toes"))
         steered = (roles.spine[0], *hips, *knees, *ankles)
         arms = (*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists"))
         pushed = (roles.one("trunk"), *roles.both("hands"))
-        super().__init__(model, graph, worlds, device, threads, (*steered, *arms), pushed)
+        super().__init__(model, graph, worlds, device, threads, (*steered, *arms, *signals), pushed)
         self.actions = sum(_count(model.dof_slice(name)) for name in steered)
         self.judged = (*roles.spine, *(n for leg in zip(hips, knees, ankles, toes) for n in leg))
         """joints in the pose cost; the arms are another's"""
         self.ends = (*roles.both("feet"), roles.one("head"))
         self.probe = Probe(
             self.sim,
-            _terms(self.ends, self.judged),
+            {**_terms(self.ends, self.judged), **(more or {})},
             (graph.goal_q, graph.goal_qd),
             _groups(self.ends, weights),
         )
@@ -108,6 +112,7 @@ class Locomotion(Follow):
         self._heading = weights.heading
         self.begins = heading(graph.start_q[:, 3:7])
         self._turns = wrapped(heading(graph.goal_q[:, 3:7]) - self.begins)
+        self._loose = [(j.q.start, j.dof.start) for j in model.joints[1:] if j.kind == "free"]
         self.heading = np.zeros(worlds)
         """(worlds,) [rad] that each world should face"""
         self.start = self._reference(graph.start_q, graph.start_qd)
@@ -165,7 +170,7 @@ class Locomotion(Follow):
         them, and as far off its heading as they are now."""
         joint_q, joint_qd = self.sim.joint_q[worlds], self.sim.joint_qd[worlds]
         by = self.begins[k] - self.heading[worlds]
-        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2]))
+        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2], self._loose))
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)

@@ -1,0 +1,210 @@
+"""The ball in the hand as a control problem: what moves arms and fingers, what they feel, what it costs (P1 5).
+
+The legs follow a locomotion policy that is learned already; a policy here offsets both arms, ten numbers each:
+shoulder 3, elbow, wrist 3, and three signals that close the fingers (Eq. 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...sims.model import Model
+from ...sims.worlds import BAD_CONTACT, Watch, terms
+from ...sims.worlds.watch import gap, last, total
+from ..graph import STEPS, ControlGraph
+from ..rollout import Controller
+from ..starts import Starts
+from .fingers import FINGERS, READY, SHARES, SIGNALS, finger_signals
+from .locomotion import WEIGHTS, CostWeights, Locomotion
+
+ARM = 10
+"""Numbers of an arm (Eq. 5): shoulder, elbow, wrist, fingers."""
+WRIST = 2.0
+"""Offsets of wrists are doubled (P1 7.1)."""
+HELD = 0.05
+"""[m] At a checkpoint the fingers are nearer than this to the ball, on average (P1 5.1)."""
+BALL_UNIT, SPEED_UNIT, HAND_UNIT = 0.05, 0.3, 0.05
+"""[m], [m/s], [m] Deviations that count as one in the state."""
+
+
+@dataclass(frozen=True)
+class BallWeights:
+    """Weights of the cost of a fragment."""
+
+    fingers: float = 20.0
+    """of the mean distance of the fingers from the ball while they should have it (Eq. 7) [m]"""
+    ball: float = 10.0
+    """of the ball's distance from where the reference has it [m]"""
+    speed: float = 1.0
+    """of the difference of its velocity [m/s]"""
+    hands: float = 3.0
+    """of both hands' distance from where the reference has them [m]"""
+    action: float = 0.5
+    """of the offsets' length [rad]"""
+    change: float = 0.5
+    """of how much they differ from the fragment before [rad]"""
+    lost: float = 0.4
+    """[m] A ball that far from its reference is lost."""
+    legs: CostWeights = field(default=WEIGHTS)
+
+
+class Arms(Locomotion):
+    """A player whose hands play with the ball along a control graph. legs: the policy of the legs.
+
+    An action has ten numbers for each arm [rad; fingers: share of the way from flat to fist]. A policy feels
+    the numbers of `observe`. The cost has the distance of the fingers from the ball over the time steps of
+    H, and how far ball and hands are from the reference; the ball is lost where it touches the player
+    elsewhere than on a hand, is too far from its reference, or out of reach at a checkpoint.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        graph: ControlGraph,
+        worlds: int,
+        legs: Controller,
+        device: str = "cpu",
+        threads: int | None = None,
+        weights: BallWeights = BallWeights(),
+    ):
+        if graph.touch is None or not graph.touch.any():
+            raise ValueError("the graph knows no ball that anybody plays with")
+        self.legs, self._weights = legs, weights
+        ball, radius = model.roles.one("ball"), model.ball_radius
+        tips = [f"{side}_{finger}_tip" for side in "lr" for finger in FINGERS]
+        hands = model.roles.both("hands")
+        more = {
+            "ball": terms.point(ball),
+            "ball velocity": terms.velocity(ball),
+            **{f"hand {hand}": terms.point(hand) for hand in hands},
+            "flight": terms.ballistic(ball, radius, float(np.mean(graph.heights)), RESTITUTION),
+            **{f"to {tip}": terms.between(ball, tip) for tip in tips},
+        }
+        super().__init__(
+            model, graph, worlds, device, threads, weights.legs, finger_signals(model), more
+        )
+        self.legs_obs, self._legs_actions = self.obs, self.actions
+        self.actions = 2 * ARM
+        self._spread = _spread()
+        self.active = active_hands(model, graph)
+        """(fragments, 20) bool: what acts on the ball, X of P1 5.1"""
+        self._units = np.concatenate(
+            [np.full(3, BALL_UNIT), np.full(3, SPEED_UNIT), np.full(6, HAND_UNIT)]
+        )
+        first = self.columns["ball"].start
+        self._arms = slice(first, first + len(self._units))
+        self.obs = len(self._units) + self.legs_obs
+        touch = graph.touch.astype(float)
+        mark = np.zeros_like(touch)
+        mark[graph.checkpoints] = touch[graph.checkpoints]
+        self.held = touch.reshape(graph.count, STEPS, 2).sum(axis=(1, 2))
+        """(fragments,) time steps, of both hands, in which the fingers should have the ball"""
+        self.marked = mark.reshape(graph.count, STEPS, 2).sum(axis=1) > 0
+        """(fragments, 2) hands that must have the ball at a checkpoint in it"""
+        share = 1.0 / len(FINGERS)
+        sides = np.repeat([0, 1], len(FINGERS))
+        soft = {tip: total(gap(tip, ball, radius), share * touch[:, h]) for tip, h in zip(tips, sides)}
+        hard = {f"at {tip}": last(gap(tip, ball, radius), mark[:, h]) for tip, h in zip(tips, sides)}
+        self.watch = Watch(self.sim, soft | hard, len(touch))
+        self._tips = len(tips)
+        self._moves = np.zeros((worlds, self.actions))
+        self._before = np.zeros((worlds, self.actions))
+        self.fingers = np.zeros(worlds)
+        """(worlds,) [m] mean distance of the fingers from the ball in H of the last fragment (Eq. 7), NaN
+        where it has none"""
+
+    def reset(self, starts: Starts, which: np.ndarray | None = None) -> None:
+        super().reset(starts, which)
+        if hasattr(self, "_before"):
+            self._before[slice(None) if which is None else which] = 0.0
+
+    def observe(self, k: np.ndarray) -> np.ndarray:
+        """State s (worlds, obs): ball, its velocity and hands off the reference, and what the legs feel."""
+        off = (self.felt[:, self._arms] - self.start[k][:, self._arms]) / self._units
+        return np.concatenate([off, super().observe(k)], axis=1)
+
+    def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
+        if first == 0:
+            legs = self.legs.act(super().observe(k), k)
+            self._moves = np.where(self.active[k], action, 0.0)
+            self._all = np.concatenate([legs, self._moves @ self._spread], axis=1)
+            closed = self._all[:, self._legs_actions + ARMS :]
+            np.clip(closed, -READY, 1.0 - READY, out=closed)
+        super().advance(k, self._all, first, count)
+
+    @property
+    def others(self) -> np.ndarray:
+        return self.course.offset[:, :0]
+
+    def judge(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """E (worlds,) of the fragments k that have just ended, infinite where the ball is lost or the player
+        has fallen, and where that is so (worlds,)."""
+        w, columns = self._weights, self.columns
+        _, failed = super().judge(k)
+        seen = self.watch.read()
+        held = self.held[k]
+        self.fingers = np.where(held > 0, seen[:, : self._tips].sum(axis=1) / np.maximum(held, 1.0), np.nan)
+        at = seen[:, self._tips :].reshape(-1, 2, len(FINGERS)).mean(axis=2)
+        missed = np.any(self.marked[k] & (at > HELD), axis=1)
+        off = self.felt - self.goal[k]
+        ball, speed = (np.linalg.norm(off[:, columns[n]], axis=1) for n in ("ball", "ball velocity"))
+        hands = sum(np.linalg.norm(off[:, columns[f"hand {h}"]], axis=1) for h in self.model.roles.both("hands"))
+        bad = self.felt[:, columns["status"]][:, 0].astype(int) & BAD_CONTACT != 0
+        failed |= bad | missed | ~(ball < w.lost)
+        cost = (
+            w.fingers * np.nan_to_num(self.fingers)
+            + w.ball * ball
+            + w.speed * speed
+            + w.hands * hands
+            + w.action * np.linalg.norm(self._moves, axis=1)
+            + w.change * np.linalg.norm(self._moves - self._before, axis=1)
+        )
+        self._before = self._moves
+        return np.where(failed, np.inf, cost), failed
+
+    def become(self, sources: np.ndarray) -> None:
+        super().become(sources)
+        self._before, self.fingers = self._before[sources], self.fingers[sources]
+
+
+ARMS = 14
+"""Columns of both arms: shoulders, elbows, wrists; the fingers' follow."""
+RESTITUTION = 0.8
+
+
+def _spread() -> np.ndarray:
+    """(20, columns) that makes offsets of an action: shoulders, elbows, wrists, fingers; left before right."""
+    out = np.zeros((2 * ARM, ARMS + 2 * len(FINGERS)))
+    for side in range(2):
+        of = ARM * side
+        out[of : of + 3, 3 * side : 3 * side + 3] = np.eye(3)
+        out[of + 3, 6 + side] = 1.0
+        out[of + 4 : of + 7, 8 + 3 * side : 11 + 3 * side] = WRIST * np.eye(3)
+        fingers = ARMS + len(FINGERS) * side
+        out[of + 7 : of + ARM, fingers : fingers + len(FINGERS)] = SHARES.T
+    return out
+
+
+def active_hands(model: Model, graph: ControlGraph) -> np.ndarray:
+    """(fragments, 20) bool: the arms that act on the ball in each fragment, X of P1 5.1: those that should have
+    it, and between two contacts the first arm until the ball is lowest, the second from there on."""
+    assert graph.touch is not None and graph.motion is not None
+    touch = np.asarray(graph.touch, bool)
+    low = graph.motion[:, model.q_slice(model.roles.one("ball_joint")).start + 2]
+    does, rows = np.zeros_like(touch), len(touch)
+    for span in graph.spans:
+        own = np.arange(STEPS * span.first, STEPS * (span.first + span.count))
+        held = np.flatnonzero(touch[own].any(axis=1))
+        if not len(held):
+            continue
+        for a, b in zip(held, np.roll(held, -1)):
+            gap = (b - a - 1) % len(own)
+            does[own[a]] = touch[own[a]]
+            free = own[(a + 1 + np.arange(gap)) % len(own)]
+            if gap:
+                turn = int(np.argmin(low[free]))
+                does[free[:turn]], does[free[turn:]] = touch[own[a]], touch[own[b]]
+    each = does.reshape(rows // STEPS, STEPS, 2).any(axis=1)
+    return np.repeat(each, ARM, axis=1)
