@@ -144,11 +144,10 @@ class ControlGraph:
         speed = np.concatenate([np.arange(other.nv)[other.dof_slice(name)] for name in model.joint_names])
         return replace(
             self,
-            **{
-                name: model.convert_q(other, value)
-                for name in ("targets", "start_q", "goal_q", "motion")
-                if (value := getattr(self, name)) is not None
-            },
+            targets=model.convert_q(other, self.targets),
+            motion=None if self.motion is None else model.convert_q(other, self.motion),
+            start_q=model.convert_q(other, self.start_q),
+            goal_q=model.convert_q(other, self.goal_q),
             start_qd=self.start_qd[:, speed],
             goal_qd=self.goal_qd[:, speed],
         )

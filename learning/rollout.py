@@ -106,6 +106,8 @@ class Rollout:
         self._began = np.zeros(task.worlds, bool)
         task.calm()
         task.reset(starts)
+        if begin := getattr(controller, "begin", None):
+            begin()  # of a controller that remembers what it has done
 
     def fragments(self, count: int) -> Iterator[Fragment]:
         """Go through so many fragments, whole ones at a time. Disturbances end with the last."""

@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,7 +31,9 @@ from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
 from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, legs_graph, locomotion_model
 from ..workers import Workers, shares
+from .em import Moments, added, descendants, improve, select
 
+T = TypeVar("T")
 RECORD_EVERY = 5
 """Fragments between recorded states."""
 SETTLED = 20
@@ -74,50 +77,12 @@ class SamconConfig:
     """iterations between trials of the policy"""
     trials: int = 256
     """of a check"""
+    check_cycles: float = 20.0
+    """that each lasts"""
     weights: CostWeights = field(default=WEIGHTS)
 
 
 # ----------------------------------------------------------------------------------------------- E-step
-
-
-@dataclass
-class Moments:
-    """What the M-step has to know of the actions that had descendants: sums over them by fragment, which
-    add up over islands. w: descendants, s: state (S), a: action (A)."""
-
-    w: np.ndarray
-    """(fragments,)"""
-    ww: np.ndarray
-    """(fragments,)"""
-    s: np.ndarray
-    """(fragments, S) of w s"""
-    a: np.ndarray
-    """(fragments, A)"""
-    ss: np.ndarray
-    """(fragments, S, S)"""
-    sa: np.ndarray
-    """(fragments, S, A)"""
-    aa: np.ndarray
-    """(fragments, A) of w a^2"""
-
-    @staticmethod
-    def of(S: np.ndarray, A: np.ndarray, k: np.ndarray, W: np.ndarray, fragments: int) -> Moments:
-        """From samples: states S (n, S), actions A (n, A), fragments k (n,), descendants W (n,)."""
-        n, m = S.shape[1], A.shape[1]
-        shapes = ((), (), (n,), (m,), (n, n), (n, m), (m,))
-        out = Moments(*(np.zeros((fragments, *shape)) for shape in shapes))
-        used = W > 0
-        S, A, k, W = S[used], A[used], k[used], W[used].astype(float)
-        for i in np.unique(k):
-            s, a, w = (x[k == i] for x in (S, A, W))
-            ws, wa = w[:, None] * s, w[:, None] * a
-            parts = w.sum(), w @ w, ws.sum(axis=0), wa.sum(axis=0), ws.T @ s, ws.T @ a, np.sum(wa * a, axis=0)
-            for total, part in zip(vars(out).values(), parts):
-                total[i] = part
-        return out
-
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(*(x + y for x, y in zip(vars(self).values(), vars(other).values())))
 
 
 @dataclass
@@ -198,65 +163,6 @@ def _island(
     return Island(moments, starts, float(E[stood].sum()), int(stood.sum()), int(lost.sum()))
 
 
-def select(E: np.ndarray, keep: float) -> tuple[np.ndarray, np.ndarray]:
-    """The particle (islands, particles) of its island whose copy each one becomes, and which islands
-    (islands,) have none left; E: costs (islands, particles). The best `keep` of an island stay; the others
-    become copies of them, of the best first."""
-    islands, particles = E.shape
-    own, order = np.arange(islands)[:, None], np.argsort(E, axis=1, kind="stable")
-    alive = np.minimum(np.isfinite(E).sum(axis=1), max(1, round(keep * particles)))
-    child = np.arange(particles) % np.maximum(alive, 1)[:, None]
-    parent = np.empty((islands, particles), int)
-    parent[own, order] = order[own, child]
-    return parent, alive == 0
-
-
-def descendants(parent: np.ndarray, lag: int) -> np.ndarray:
-    """How many particles `lag` rows later descend from each one (rows, particles), or at the end, for the
-    last rows. parent: (rows, particles), whose copy each one is after its row; -1: the walk began anew."""
-    rows, particles = parent.shape
-    nobody = np.concatenate([parent, np.full((rows, 1), -1)], axis=1)
-    counts = np.zeros((rows, particles), int)
-    for row in range(rows):
-        line = np.arange(particles)
-        for later in nobody[row : row + lag + 1][::-1]:
-            line = later[line]
-        counts[row] = np.bincount(line[line >= 0], minlength=particles)
-    return counts
-
-
-# ----------------------------------------------------------------------------------------------- M-step
-
-
-def improve(policy: LinearPolicy, seen: Moments, config: SamconConfig, feedback: bool) -> LinearPolicy:
-    """M-step: the policy that makes the actions with descendants likely, near the old one.
-
-    With weights w that sum to one, means s_, a_ and residuals about them, M solves
-    min sum w |a - M s|^2 + (ridge + doubt / n) |M - M_old|^2, n = 1 / sum w^2; then
-    a_hat = a_ - M s_ and sigma^2 is the mean of the old one and the residuals'. Without feedback only
-    a_hat moves.
-    """
-    new = policy.copy()
-    for k in np.flatnonzero(seen.w):
-        w = seen.w[k]
-        n = w**2 / seen.ww[k]
-        mean_s, mean_a = seen.s[k] / w, seen.a[k] / w
-        if not feedback:
-            new.a_hat[k] += n / (n + 5.0) * (mean_a - policy.a_hat[k])
-            continue
-        ss = seen.ss[k] / w - np.outer(mean_s, mean_s)
-        sa = seen.sa[k] / w - np.outer(mean_s, mean_a)
-        aa = seen.aa[k] / w - mean_a**2
-        pull = (config.ridge + config.doubt / n) * np.eye(len(ss))
-        new.M[k] += np.linalg.solve(ss + pull, sa - ss @ policy.M[k].T).T
-        new.a_hat[k] = mean_a - new.M[k] @ mean_s
-        M = new.M[k]
-        spread = aa - 2.0 * np.sum(M * sa.T, axis=1) + np.sum(M @ ss * M, axis=1)
-        spread = np.maximum(spread, 0.0)
-        new.sigma[k] = np.sqrt(np.maximum(0.5 * policy.sigma[k] ** 2 + 0.5 * spread, config.least_sigma**2))
-    return new
-
-
 # ---------------------------------------------------------------------------------------------- learning
 
 
@@ -318,13 +224,26 @@ class Samcon:
         c = self.config
         islands = self._explore()
         feedback = self.iteration >= c.open_loop
-        self.policy = improve(self.policy, _total([i.moments for i in islands]), c, feedback)
+        self.policy = improve(self.policy, added([i.moments for i in islands]), c, feedback)
         self.mean = self.policy.moved(self.mean, c.average if feedback else 0.0)
         if found := [island.starts for island in islands if island.starts is not None]:
             self.starts = Starts.joined(found)
+        return self.tried(islands, began, before)
+
+    def tried(
+        self,
+        islands: Sequence[Island] = (),
+        began: float | None = None,
+        before: tuple[float, float] | None = None,
+    ) -> Progress:
+        """The end of an iteration: try the policies, if it is time, and say how it went. began [s], before:
+        when, and with what spent."""
+        began = time.perf_counter() if began is None else began
+        before = self._spent if before is None else before
+        first = self.iteration == 0 and not islands
         self.iteration += 1
         survived = np.nan
-        if self.iteration % c.check_every == 0 or self.done:
+        if first or self.iteration % self.config.check_every == 0 or self.done:
             survived = self.check()
         seconds = time.perf_counter() - began
         samples, simulating = np.subtract(self._spent, before) / seconds
@@ -411,19 +330,11 @@ def _try(
     task: Locomotion, policy: LinearPolicy, starts: Starts, c: SamconConfig, seed: int, least: float
 ) -> tuple[Trials, float, Starts | None]:
     """Trials of a policy, its score, and where it can be started from if that is above `least`."""
-    trials = run_trials(task, policy, starts, 20, seed, c.speed_noise, c.disturbance)
+    trials = run_trials(task, policy, starts, c.check_cycles, seed, c.speed_noise, c.disturbance)
     score = float(trials.lived.mean()) - 0.01 * trials.cost if trials.lived.any() else -1.0
     if score <= least:
         return trials, score, None
     return trials, score, record_starts(task, policy, starts, seed, replace(c.disturbance, push=0.0))
-
-
-def _total(parts: Sequence[Moments]) -> Moments:
-    """Their sum, in their order."""
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    return total
 
 
 # ------------------------------------------------------------------------------------------------- stage
@@ -432,15 +343,21 @@ def _total(parts: Sequence[Moments]) -> Moments:
 def make(context: Context) -> Samcon:
     """The learner of a graph, in worlds shared out among the workers."""
     c: SamconConfig = context.config
-    model, count = locomotion_model(), max(1, min(context.workers, c.islands))
+    model, graph = locomotion_model(), legs_graph(context.graph)
+    tasks, trial_tasks = shared(
+        context, lambda worlds, threads: Locomotion(model, graph, worlds, context.device, threads, c.weights)
+    )
+    return Samcon(tasks, trial_tasks, c, context.seed)
+
+
+def shared(context: Context, build: Callable[[int, int | None], T]) -> tuple[list[T], list[T]]:
+    """The tasks of islands, one for each worker, and those of trials. build: makes one of so many worlds, and
+    threads."""
+    c: SamconConfig = context.config
+    count = max(1, min(context.workers, c.islands))
     threads = None if count == 1 else max(1, (os.cpu_count() or 1) // count)
-    graph = legs_graph(context.graph)
-
-    def task(worlds: int) -> Locomotion:
-        return Locomotion(model, graph, worlds, context.device, threads, c.weights)
-
-    tasks = [task(c.particles * islands) for islands in shares(c.islands, count)]
-    return Samcon(tasks, [task(c.trials) for _ in range(min(count, TRIED))], c, context.seed)
+    tasks = [build(c.particles * islands, threads) for islands in shares(c.islands, count)]
+    return tasks, [build(c.trials, threads) for _ in range(min(count, TRIED))]
 
 
 def locomotion_task(context: Context, worlds: int) -> Locomotion:

@@ -32,11 +32,8 @@ class LinearPolicy:
 
     def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
         """Actions (n, actions) [rad] for states s (n, states) at the start of fragments k (n,)."""
-        a = self.a_hat[k]
-        for i in np.unique(k):
-            rows = k == i
-            a[rows] += s[rows] @ self.M[i].T
-        return np.asarray(a)
+        a = np.einsum("ns,nas->na", s, self.M[k])  # its bits do not depend on how many worlds there are
+        return np.asarray(a + self.a_hat[k])
 
     def copy(self) -> LinearPolicy:
         return LinearPolicy(self.M.copy(), self.a_hat.copy(), self.sigma.copy())

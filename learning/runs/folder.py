@@ -205,6 +205,11 @@ class StageFolder:
         with said_if_damaged(path, "put it right, or learn again", "out"):
             return filled(self.stage.config(), json.loads(path.read_text(encoding="utf-8")))
 
+    @property
+    def learned(self) -> bool:
+        """Whether it has a result."""
+        return (self.path / RESULT).exists()
+
     def make(self) -> None:
         """Make the folder, without what killed writers have left in it. Only for who holds the run."""
         self.path.mkdir(exist_ok=True)

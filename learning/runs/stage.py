@@ -90,6 +90,8 @@ class Stage:
     """worlds in which it is tried"""
     needs: tuple[str, ...] = ()
     """stages whose results it starts from"""
+    ball: bool = False
+    """only for a skill in which somebody plays with one"""
     save_iterations: int = 1
     save_seconds: float = 30.0
     """A checkpoint is written after so many iterations, or so much time, whichever comes first."""

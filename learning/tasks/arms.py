@@ -1,11 +1,13 @@
-"""The ball in the hand as a control problem: what moves arms and fingers, what they feel, what it costs (P1 5).
+"""The ball in the hand as a control problem: what moves arms and fingers, what they feel, what it costs
+(P1 5).
 
-The legs follow a locomotion policy that is learned already; a policy here offsets both arms, ten numbers each:
-shoulder 3, elbow, wrist 3, and three signals that close the fingers (Eq. 5).
+The legs follow a locomotion policy that is learned already; a policy here offsets both arms, ten numbers
+each: shoulder 3, elbow, wrist 3, and three signals that close the fingers (Eq. 5).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +18,7 @@ from ...sims.worlds.watch import gap, last, total
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
-from .fingers import FINGERS, READY, SHARES, SIGNALS, finger_signals
+from .fingers import FINGERS, READY, SHARES, SIGNALS, finger_joints, finger_signals
 from .locomotion import WEIGHTS, CostWeights, Locomotion
 
 ARM = 10
@@ -25,15 +27,19 @@ WRIST = 2.0
 """Offsets of wrists are doubled (P1 7.1)."""
 HELD = 0.05
 """[m] At a checkpoint the fingers are nearer than this to the ball, on average (P1 5.1)."""
-BALL_UNIT, SPEED_UNIT, HAND_UNIT = 0.05, 0.3, 0.05
-"""[m], [m/s], [m] Deviations that count as one in the state."""
+UNITS = {"POINT": 0.05, "VELOCITY": 0.3, "BETWEEN": 0.05, "BALLISTIC": 0.05, "COM": 0.05, "COM_VELOCITY": 0.3,
+         "ANGULAR_MOMENTUM": 3.0}  # fmt: skip
+"""[m, m/s, s, kg m^2/s] Deviations that count as one in the state, by kind of observation."""
+STATES = ("reduced", "ballistic", "paper", "tips")
+"""What a policy may feel: ball, hands and what the legs feel; with the ball's flight, too; the 165 numbers of
+Eq. 9; the way from the ball to thumbs, index and little fingers, 18 numbers (P1 7.1, skill A)."""
 
 
 @dataclass(frozen=True)
 class BallWeights:
     """Weights of the cost of a fragment."""
 
-    fingers: float = 20.0
+    fingers: float = 100.0
     """of the mean distance of the fingers from the ball while they should have it (Eq. 7) [m]"""
     ball: float = 10.0
     """of the ball's distance from where the reference has it [m]"""
@@ -41,20 +47,23 @@ class BallWeights:
     """of the difference of its velocity [m/s]"""
     hands: float = 3.0
     """of both hands' distance from where the reference has them [m]"""
-    action: float = 0.5
+    action: float = 0.2
     """of the offsets' length [rad]"""
-    change: float = 0.5
+    change: float = 0.2
     """of how much they differ from the fragment before [rad]"""
     lost: float = 0.4
     """[m] A ball that far from its reference is lost."""
     legs: CostWeights = field(default=WEIGHTS)
 
 
+USUAL = BallWeights()
+
+
 class Arms(Locomotion):
     """A player whose hands play with the ball along a control graph. legs: the policy of the legs.
 
-    An action has ten numbers for each arm [rad; fingers: share of the way from flat to fist]. A policy feels
-    the numbers of `observe`. The cost has the distance of the fingers from the ball over the time steps of
+    state: what a policy feels, one of STATES. An action has ten numbers for each arm [rad; fingers: share of
+    the way from flat to fist]. The cost has the distance of the fingers from the ball over the time steps of
     H, and how far ball and hands are from the reference; the ball is lost where it touches the player
     elsewhere than on a hand, is too far from its reference, or out of reach at a checkpoint.
     """
@@ -67,35 +76,50 @@ class Arms(Locomotion):
         legs: Controller,
         device: str = "cpu",
         threads: int | None = None,
-        weights: BallWeights = BallWeights(),
+        weights: BallWeights = USUAL,
+        state: str = "reduced",
     ):
+        if state not in STATES:
+            raise ValueError(f"there is no state '{state}'; there are {', '.join(STATES)}")
         if graph.touch is None or not graph.touch.any():
             raise ValueError("the graph knows no ball that anybody plays with")
         self.legs, self._weights = legs, weights
         ball, radius = model.roles.one("ball"), model.ball_radius
         tips = [f"{side}_{finger}_tip" for side in "lr" for finger in FINGERS]
-        hands = model.roles.both("hands")
+        hands = [f"hand {hand}" for hand in model.roles.both("hands")]
+        meet = float(np.mean(graph.heights if graph.heights is not None else []))
         more = {
             "ball": terms.point(ball),
             "ball velocity": terms.velocity(ball),
-            **{f"hand {hand}": terms.point(hand) for hand in hands},
-            "flight": terms.ballistic(ball, radius, float(np.mean(graph.heights)), RESTITUTION),
+            **{f"hand {hand}": terms.point(hand) for hand in model.roles.both("hands")},
+            **{f"hand {hand} velocity": terms.velocity(hand) for hand in model.roles.both("hands")},
+            "flight": terms.ballistic(ball, radius, meet, RESTITUTION),
             **{f"to {tip}": terms.between(ball, tip) for tip in tips},
         }
-        super().__init__(
-            model, graph, worlds, device, threads, weights.legs, finger_signals(model), more
-        )
+        felt = ["ball", "ball velocity", *hands, *(f"{hand} velocity" for hand in hands)]
+        if state == "ballistic":
+            felt.append("flight")
+        elif state == "tips":
+            felt = [f"to {tip}" for tip in tips if tip.split("_")[1] in SIGNALS]
+        elif state == "paper":
+            fingers = {model.joint_body(name) for side in finger_joints(model) for name in side}
+            own = model.descendants(model.joint_body(model.root))
+            bodies = [model.body_names[b] for b in own if b not in fingers]
+            more |= {f"body {b}": terms.point(b) for b in bodies}
+            more |= {f"body {b} velocity": terms.velocity(b) for b in bodies}
+            felt = ["ball", "ball velocity", *(n for n in more if n.startswith("body "))]
+            felt += [*(f"to {tip}" for tip in tips), "com", "com_velocity", "momentum"]
+        super().__init__(model, graph, worlds, device, threads, weights.legs, finger_signals(model), more)
         self.legs_obs, self._legs_actions = self.obs, self.actions
         self.actions = 2 * ARM
         self._spread = _spread()
         self.active = active_hands(model, graph)
         """(fragments, 20) bool: what acts on the ball, X of P1 5.1"""
-        self._units = np.concatenate(
-            [np.full(3, BALL_UNIT), np.full(3, SPEED_UNIT), np.full(6, HAND_UNIT)]
-        )
-        first = self.columns["ball"].start
-        self._arms = slice(first, first + len(self._units))
-        self.obs = len(self._units) + self.legs_obs
+        kinds = self.terms
+        self._arms = np.concatenate([np.arange(self.probe.size)[self.columns[n]] for n in felt])
+        self._units = np.concatenate([np.full(kinds[n].count, UNITS[kinds[n].kind]) for n in felt])
+        self._legs_too = state in ("reduced", "ballistic")
+        self.obs = len(self._units) + self.legs_obs * self._legs_too
         touch = graph.touch.astype(float)
         mark = np.zeros_like(touch)
         mark[graph.checkpoints] = touch[graph.checkpoints]
@@ -121,9 +145,9 @@ class Arms(Locomotion):
             self._before[slice(None) if which is None else which] = 0.0
 
     def observe(self, k: np.ndarray) -> np.ndarray:
-        """State s (worlds, obs): ball, its velocity and hands off the reference, and what the legs feel."""
+        """State s (worlds, obs): how far what is felt is off the reference at the start of fragments k."""
         off = (self.felt[:, self._arms] - self.start[k][:, self._arms]) / self._units
-        return np.concatenate([off, super().observe(k)], axis=1)
+        return np.concatenate([off, super().observe(k)], axis=1) if self._legs_too else off
 
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         if first == 0:
@@ -143,6 +167,7 @@ class Arms(Locomotion):
         has fallen, and where that is so (worlds,)."""
         w, columns = self._weights, self.columns
         _, failed = super().judge(k)
+        assert self.watch is not None
         seen = self.watch.read()
         held = self.held[k]
         self.fingers = np.where(held > 0, seen[:, : self._tips].sum(axis=1) / np.maximum(held, 1.0), np.nan)
@@ -150,7 +175,9 @@ class Arms(Locomotion):
         missed = np.any(self.marked[k] & (at > HELD), axis=1)
         off = self.felt - self.goal[k]
         ball, speed = (np.linalg.norm(off[:, columns[n]], axis=1) for n in ("ball", "ball velocity"))
-        hands = sum(np.linalg.norm(off[:, columns[f"hand {h}"]], axis=1) for h in self.model.roles.both("hands"))
+        hands = sum(
+            np.linalg.norm(off[:, columns[f"hand {h}"]], axis=1) for h in self.model.roles.both("hands")
+        )
         bad = self.felt[:, columns["status"]][:, 0].astype(int) & BAD_CONTACT != 0
         failed |= bad | missed | ~(ball < w.lost)
         cost = (
@@ -168,6 +195,13 @@ class Arms(Locomotion):
         super().become(sources)
         self._before, self.fingers = self._before[sources], self.fingers[sources]
 
+    def snapshot(self) -> dict[str, np.ndarray]:
+        return super().snapshot() | {"before": np.array(self._before)}
+
+    def recall(self, snapshot: Mapping[str, np.ndarray]) -> None:
+        super().recall(snapshot)
+        self._before = np.array(snapshot["before"])
+
 
 ARMS = 14
 """Columns of both arms: shoulders, elbows, wrists; the fingers' follow."""
@@ -175,7 +209,7 @@ RESTITUTION = 0.8
 
 
 def _spread() -> np.ndarray:
-    """(20, columns) that makes offsets of an action: shoulders, elbows, wrists, fingers; left before right."""
+    """(20, columns) from actions to offsets: shoulders, elbows, wrists, fingers, left before right."""
     out = np.zeros((2 * ARM, ARMS + 2 * len(FINGERS)))
     for side in range(2):
         of = ARM * side
@@ -188,8 +222,8 @@ def _spread() -> np.ndarray:
 
 
 def active_hands(model: Model, graph: ControlGraph) -> np.ndarray:
-    """(fragments, 20) bool: the arms that act on the ball in each fragment, X of P1 5.1: those that should have
-    it, and between two contacts the first arm until the ball is lowest, the second from there on."""
+    """(fragments, 20) bool: the arms that act on the ball in each fragment, X of P1 5.1: those that should
+    have it, and between two contacts the first arm until the ball is lowest, the second from there on."""
     assert graph.touch is not None and graph.motion is not None
     touch = np.asarray(graph.touch, bool)
     low = graph.motion[:, model.q_slice(model.roles.one("ball_joint")).start + 2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,15 @@ class Follow:
     def become(self, sources: np.ndarray) -> None:
         """Every world becomes a copy of another (worlds,)."""
         self.sim.copy_worlds(sources)
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """All that the future of all worlds depends on, between two fragments, by name; for `recall`."""
+        return {f"sim.{name}": values for name, values in self.sim.state().arrays.items()}
+
+    def recall(self, snapshot: Mapping[str, np.ndarray]) -> None:
+        """All worlds are again as they were."""
+        arrays = {name[4:]: v for name, v in snapshot.items() if name.startswith("sim.")}
+        self.sim.place(State.made(arrays, self.sim.device))
 
     def calm(self) -> None:
         """End all disturbances."""

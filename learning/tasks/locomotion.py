@@ -94,9 +94,10 @@ class Locomotion(Follow):
         self.judged = (*roles.spine, *(n for leg in zip(hips, knees, ankles, toes) for n in leg))
         """joints in the pose cost; the arms are another's"""
         self.ends = (*roles.both("feet"), roles.one("head"))
+        self.terms = {**_terms(self.ends, self.judged), **(more or {})}
         self.probe = Probe(
             self.sim,
-            {**_terms(self.ends, self.judged), **(more or {})},
+            self.terms,
             (graph.goal_q, graph.goal_qd),
             _groups(self.ends, weights),
         )
@@ -111,8 +112,8 @@ class Locomotion(Follow):
         self.obs = len(self.scale) + 1
         self._heading = weights.heading
         self.begins = heading(graph.start_q[:, 3:7])
-        self._turns = wrapped(heading(graph.goal_q[:, 3:7]) - self.begins)
-        self._loose = [(j.q.start, j.dof.start) for j in model.joints[1:] if j.kind == "free"]
+        self.turns = wrapped(heading(graph.goal_q[:, 3:7]) - self.begins)
+        self.loose = [(j.q.start, j.dof.start) for j in model.joints[1:] if j.kind == "free"]
         self.heading = np.zeros(worlds)
         """(worlds,) [rad] that each world should face"""
         self.start = self._reference(graph.start_q, graph.start_qd)
@@ -153,7 +154,7 @@ class Locomotion(Follow):
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         super().advance(k, action, first, count)
         if first + count == STEPS:
-            self.heading = wrapped(self.heading + self._turns[k])
+            self.heading = wrapped(self.heading + self.turns[k])
             self._feel(k)
 
     def judge(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -170,11 +171,18 @@ class Locomotion(Follow):
         them, and as far off its heading as they are now."""
         joint_q, joint_qd = self.sim.joint_q[worlds], self.sim.joint_qd[worlds]
         by = self.begins[k] - self.heading[worlds]
-        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2], self._loose))
+        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2], self.loose))
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)
         self.felt, self.heading = self.felt[sources], self.heading[sources]
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        return super().snapshot() | {"felt": np.array(self.felt), "heading": np.array(self.heading)}
+
+    def recall(self, snapshot: Mapping[str, np.ndarray]) -> None:
+        super().recall(snapshot)
+        self.felt, self.heading = np.array(snapshot["felt"]), np.array(snapshot["heading"])
 
     def _feel(self, k: np.ndarray | int) -> None:
         self.felt, self._cost = self.probe.judge(k)

@@ -123,11 +123,21 @@ class State:
         values = {name: self[name][np.asarray(rows)] for name in self.names}
         return _plain(values, self.data.device)
 
-    def __getstate__(self) -> dict[str, np.ndarray]:
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All of it by name, for a file; see `made`."""
         return {name: self[name] for name in self.names}
 
+    @staticmethod
+    def made(arrays: Mapping[str, np.ndarray], device: Any = "cpu") -> State:
+        """States of what `arrays` were."""
+        return _plain(dict(arrays), device)
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        return self.arrays
+
     def __setstate__(self, values: dict[str, np.ndarray]) -> None:
-        made = _plain(values, "cpu")
+        made = State.made(values)
         self.data, self.layout = made.data, made.layout
 
 

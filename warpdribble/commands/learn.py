@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,12 +27,17 @@ class Learn:
     """Name of a skill (warpdribble skill list), or a skill's .toml file; a cyclic one."""
     out: Path
     """Folder of the run."""
-    stage: str = "locomotion"
-    """What to learn. locomotion: to stay up and follow the motion, without the ball."""
+    stage: str = ""
+    """What to learn: locomotion, to stay up and follow the motion without the ball; ball, cycle after cycle
+    of arms and fingers that keep it; linear, a policy that does. When empty, all that the skill needs, in
+    this order."""
+    method: str = ""
+    """How the stage ball finds its cycles: smc (the usual one), paper or newton."""
     seed: int = 0
     """Of everything random; the same seed gives the same policy."""
     iterations: int | None = None
-    """How many in all; more than before extends a run. By default as many as usual."""
+    """How many in all, of the stage that is named; more than before extends it. By default as many as
+    usual."""
     workers: int | None = None
     """How many simulate at once; one for each processor core by default. It changes nothing that is
     learned."""
@@ -44,6 +49,7 @@ class Learn:
     def run(self) -> int:
         from ..learning import Run
         from ..learning.methods import STAGES
+        from ..sims.errors import InputError
         from ..skills import read_skill
         from ..skills.graph import skill_fields, skill_text
 
@@ -54,8 +60,12 @@ class Learn:
             check_range("--workers", self.workers, 1, 1024)
         if self.data is not None and not self.data.is_dir():
             raise ValueError(f"--data {self.data}: no such folder")
-        if self.stage not in STAGES:
+        if self.stage and self.stage not in STAGES:
             raise ValueError(f"--stage {self.stage}: give one of {', '.join(STAGES)}")
+        if self.iterations is not None and not self.stage:
+            raise ValueError(f"--iterations {self.iterations}: of which stage? name it with --stage")
+        if self.method and self.stage not in ("", "ball"):
+            raise ValueError(f"--method {self.method}: it is for the stage ball")
         one = read_skill(self.skill)
         find_device(self.device)
         run = Run.begin(self.out, skill_fields(one), self.seed)
@@ -66,7 +76,23 @@ class Learn:
             f"graph     {graph.count} fragments of {graph.period:g} s, "
             f"time stretched by {100.0 * (graph.stretch - 1.0):+.1f} %"
         )
-        return self._learn(run, STAGES[self.stage])
+        plays = graph.touch is not None and bool(graph.touch.any())
+        stages = [stage for stage in STAGES.values() if plays or not stage.ball]
+        if self.stage:
+            stages = [STAGES[self.stage]]
+        elif not plays and one.ball:
+            say("          nobody plays with a ball: locomotion only")
+        for number, stage in enumerate(stages):
+            if code := self._learn(run, stage):
+                return code
+            if number + 1 < len(stages) and not run.stage(stage).learned:
+                raise InputError(
+                    f"{stage.name} has found nothing that {stages[number + 1].name} could start from",
+                    run.folder,
+                    "seed",
+                )
+        self._next(run)
+        return 0
 
     def _graph(self, one: Skill) -> Any:
         from ..skills import skill_graph
@@ -81,6 +107,7 @@ class Learn:
         from ..learning.workers import usual_workers
 
         at, shown = 0, Shown()
+        say(f"stage     {stage.name}: {stage.about}")
         workers = self.workers or usual_workers(self.device)
         with compiling():
             warmed(stage.task(run.context(stage, stage.config(), self.device), 1))
@@ -101,6 +128,7 @@ class Learn:
                 trained = train(
                     run,
                     stage,
+                    self._config(stage),
                     iterations=self.iterations,
                     device=self.device,
                     workers=workers,
@@ -114,14 +142,27 @@ class Learn:
         self._summary(run, stage, trained)
         return 0
 
+    def _config(self, stage: Stage) -> Any:
+        """The parameters that were asked for; None for the usual ones, or those that the stage was begun
+        with."""
+        return replace(stage.config(), method=self.method) if self.method and stage.name == "ball" else None
+
+    def _next(self, run: Run) -> None:
+        """What may be done with it."""
+        say(f"next      warpdribble evaluate {self.out} --cycles 200 --trials 100")
+        say(f"          warpdribble export {self.out} --seconds 20 --out take.usdc")
+
     def _summary(self, run: Run, stage: Stage, trained: Trained) -> None:
-        from ..learning.runs.folder import RESULT
         from ..learning.runs.log import read_rows
 
         folder = run.stage(stage).path
         if rows := read_rows(folder):
             tried = [row["survived"] for row in rows if math.isfinite(row.get("survived", math.nan))]
             share = f", {100.0 * tried[-1]:.0f} % of the last trials survived" if tried else ""
+            if "cycles" in rows[-1]:
+                share = (
+                    f": {rows[-1]['cycles']:.0f} cycles, fingers {rows[-1]['fingers']:.1f} cm from the ball"
+                )
             say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{share}")
             if "samples_per_second" in rows[-1]:
                 rate = sum(row["samples_per_second"] for row in rows) / len(rows)
@@ -132,9 +173,6 @@ class Learn:
                 )
         if not trained.has_events:
             say("          no files for TensorBoard: pip install tensorboard, and the same again")
-        if (folder / RESULT).exists():
-            say(f"next      warpdribble evaluate {self.out} --cycles 200 --trials 100")
-            say(f"          warpdribble export {self.out} --seconds 20 --out take.usdc")
 
 
 class Shown:
@@ -149,6 +187,11 @@ class Shown:
         survived, cost = getattr(report, "survived", math.nan), getattr(report, "cost", math.nan)
         self.tried = survived if math.isfinite(survived) else self.tried
         parts = [f"{100.0 * self.tried:.0f} % survived"] if math.isfinite(self.tried) else []
+        if (cycles := getattr(report, "cycles", None)) is not None:
+            parts = [
+                f"{cycles} cycles",
+                f"fingers {getattr(report, 'fingers', math.nan):.1f} cm from the ball",
+            ]
         text = ", ".join([*parts, f"cost {cost:.2f}"])
         self.progress(report.iteration, f": {text}", self.total)
         if report.fresh and not sys.stderr.isatty():

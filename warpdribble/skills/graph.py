@@ -7,6 +7,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..assets import path as asset
 from ..learning.graph import ControlGraph, cyclic_graph
 from ..learning.tasks.fingers import with_ready_hands
@@ -46,6 +48,7 @@ def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGr
         raise InputError(reason, hint="cyclic")
     cycle = one.cycle
     if one.ball is not None:
-        joint_q = with_ready_hands(player, cycle.reference.joint_q, one.ball.touch.any(axis=0))
+        plays = np.asarray(one.ball.touch.any(axis=0))
+        joint_q = with_ready_hands(player, cycle.reference.joint_q, plays)
         cycle = replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
     return cyclic_graph(player, cycle, player.roles.both("feet"), skill.name, one.ball), one.notes

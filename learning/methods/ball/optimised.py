@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ....sims.planar import turned
 from ...choose import Ahead
 from ...rollout import Rollout
 from ...runs.stage import Arrays
@@ -48,8 +49,8 @@ class Optimised:
         return Optimised(*(np.asarray(arrays[f.name]) for f in fields(Optimised)))
 
     def distance(self, count: int) -> np.ndarray:
-        """(cycles,) [m] mean distance of the fingers in H over each whole cycle of `count` fragments, the first
-        term of Eq. 6 (over fragments, not frames)."""
+        """(cycles,) [m] mean distance of the fingers in H over each whole cycle of `count` fragments: the
+        first term of Eq. 6."""
         whole = len(self) // count * count
         return np.asarray(np.nanmean(self.fingers[:whole].reshape(-1, count), axis=1))
 
@@ -66,6 +67,10 @@ class Playback:
     def __init__(self, found: Optimised):
         self.found, self.row = found, 0
 
+    def begin(self) -> None:
+        """From its first fragment again."""
+        self.row = 0
+
     def act(self, obs: np.ndarray, k: np.ndarray) -> np.ndarray:
         action = np.zeros((len(k), self.found.action.shape[1]))
         if self.row < len(self.found):
@@ -78,7 +83,9 @@ def played(task: Arms, found: Optimised, fragments: int | None = None) -> tuple[
     """Play it back in all worlds of a task from its first state: for how many fragments (worlds,) nothing is
     lost, and the fingers' distance (fragments,) in the first world."""
     count = len(found) if fragments is None else fragments
-    starts = Starts(*(np.repeat(x[:1], task.worlds, axis=0) for x in (found.k, found.joint_q, found.joint_qd)))
+    starts = Starts(
+        *(np.repeat(x[:1], task.worlds, axis=0) for x in (found.k, found.joint_q, found.joint_qd))
+    )
     rollout, fingers = Rollout(task, Playback(found), Ahead(), starts), []
     stands, lived = np.ones(task.worlds, bool), np.zeros(task.worlds, int)
     for fragment in rollout.fragments(count):
@@ -86,3 +93,24 @@ def played(task: Arms, found: Optimised, fragments: int | None = None) -> tuple[
         lived += stands
         fingers.append(task.fingers[0])
     return lived, np.array(fingers)
+
+
+def states_of(task: Arms, found: Optimised) -> Starts:
+    """The states that it comes through (n,), to start from: where the reference begins each fragment, and as
+    far off its heading as it is."""
+    turns = task.turns[found.k]
+    faced = task.begins[found.k[0]] + np.concatenate([[0.0], np.cumsum(turns[:-1])])
+    by = task.begins[found.k] - faced
+    place = task.graph.start_q[found.k, :2]
+    return Starts(found.k, *turned(found.joint_q, found.joint_qd, by, place, task.loose))
+
+
+def observed(task: Arms, starts: Starts) -> np.ndarray:
+    """(n, obs) what a policy feels in given states, in so many worlds at a time as the task has."""
+    out = []
+    for first in range(0, len(starts), task.worlds):
+        rows = np.minimum(np.arange(first, first + task.worlds), len(starts) - 1)
+        some = Starts(*(part[rows] for part in vars(starts).values()))
+        task.reset(some)
+        out.append(task.observe(some.k))
+    return np.concatenate(out)[: len(starts)]
