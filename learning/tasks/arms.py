@@ -135,6 +135,8 @@ class Arms(Locomotion):
         self._tips = len(tips)
         self._moves = np.zeros((worlds, self.actions))
         self._before = np.zeros((worlds, self.actions))
+        self.near = np.inf
+        """[m] Distances of the fingers beyond this count less and less."""
         self.fingers = np.zeros(worlds)
         """(worlds,) [m] mean distance of the fingers from the ball in H of the last fragment (Eq. 7), NaN
         where it has none"""
@@ -181,7 +183,7 @@ class Arms(Locomotion):
         bad = self.felt[:, columns["status"]][:, 0].astype(int) & BAD_CONTACT != 0
         failed |= bad | missed | ~(ball < w.lost)
         cost = (
-            w.fingers * np.nan_to_num(self.fingers)
+            w.fingers * np.nan_to_num(self.fingers / (1.0 + np.maximum(self.fingers, 0.0) / self.near))
             + w.ball * ball
             + w.speed * speed
             + w.hands * hands

@@ -19,9 +19,14 @@ def player():
 
 
 @pytest.fixture(scope="session")
-def dribble(player):
+def full():
+    """The whole player with the ball."""
+    return Model.load("player")
+
+
+@pytest.fixture(scope="session")
+def dribble(player, full):
     """A cycle of 70 steps in place, the ball left out."""
-    full = Model.load("player")
     reference = authored_clip(full, "dribble_right").reference
     return Cycle(replace(reference, joint_q=player.convert_q(full, reference.joint_q)))
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpdribble.learning import Ahead, Locomotion, Report, Rollout, Stage, Starts, locomotion_model
 from warpdribble.learning.methods import samcon
+from warpdribble.learning.tasks.locomotion import legs_graph
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Armed(Locomotion):
     """The player whose policy moves the arms too."""
 
     def __init__(self, context, worlds):
-        super().__init__(locomotion_model(), context.graph, worlds, context.device)
+        super().__init__(locomotion_model(), legs_graph(context.graph), worlds, context.device)
         self.actions = self.course.columns
 
 

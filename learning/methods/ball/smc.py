@@ -46,6 +46,10 @@ class SmcConfig:
     """cycles at first that learn offsets only"""
     forget: float = 0.7
     """what the cycles before count, from cycle to cycle"""
+    settled: int = 5
+    """cycles after which fingers count in full; before, the ball's way counts more"""
+    near: float = 0.01
+    """[m] distance of the fingers beyond which they count less until then"""
     ridge: float = 0.02
     """pull of the feedback to what it was, per unit of state variance"""
     doubt: float = 20.0
@@ -150,6 +154,7 @@ class Smc:
         """Try a cycle further."""
         task, c, began = self.task, self.config, time.perf_counter()
         samples, simulating = task.samples, task.simulating
+        task.near = np.inf if self.found_cycles >= c.settled else c.near
         streams = Streams([np.random.default_rng((self.seed, self.iteration))], group=c.particles)
         self.rollout.controller = Explore(self.policy, streams)
         rows, costs = self._walk()
@@ -201,7 +206,8 @@ class Smc:
         """M-step, with the first `count` of rows; of a lost walk those whose descendants lived on for half of
         the lag."""
         c, task = self.config, self.task
-        lag = c.lag if count is not None else c.lag // 2
+        lost = count is None
+        lag = c.lag // 2 if lost else c.lag
         count = max(0, len(rows) - lag) if count is None else count
         if not count:
             return
@@ -210,8 +216,12 @@ class Smc:
         each = np.repeat(rows.k[:count], task.worlds)
         seen = Moments.of(S, A, each, W.ravel(), task.graph.count)
         self.moments = self.moments.scaled(c.forget) + seen
+        sigma = self.policy.sigma
         self.policy = improve(self.policy, self.moments, c, self.learned >= c.open_loop)
-        self.learned += 1
+        if lost:
+            self.policy.sigma = sigma  # few ancestors are left of it: that they agree says nothing
+        else:
+            self.learned += 1
 
     def _decide(self, count: int) -> None:
         """The first `count` rows are decided: learn from them, and keep the ancestor that most particles

@@ -16,6 +16,7 @@ from ...runs.stage import Arrays, Context, Learner, Stage
 from ...starts import Starts
 from ...tasks.arms import USUAL, Arms, BallWeights
 from .. import samcon
+from .hold import in_hand
 from .optimised import Optimised, Playback
 from .smc import Smc, SmcConfig
 
@@ -60,11 +61,16 @@ def task(context: Context, worlds: int) -> Arms:
     return arms(context, worlds, weights=context.config.weights)
 
 
-def ball_in_hand(graph: ControlGraph) -> Starts:
-    """The state of the reference that begins the first checkpoint's fragment: the ball is in the hand."""
-    assert graph.checkpoints is not None
-    k = np.array([int(graph.checkpoints[0]) // STEPS if len(graph.checkpoints) else 0])
-    return Starts(k, graph.start_q[k], graph.start_qd[k])
+def ball_in_hand(model: Model, graph: ControlGraph) -> Starts:
+    """A state of the reference with the ball in the hand, where a fragment begins soon after a checkpoint."""
+    assert graph.touch is not None and graph.checkpoints is not None
+    before = graph.touch.reshape(graph.count, STEPS, 2)[:, -1].any(axis=1)
+    began = np.roll(before, 1)
+    mark = int(graph.checkpoints[0]) if len(graph.checkpoints) else 0
+    after = (np.arange(graph.count) * STEPS - mark - 1) % (graph.count * STEPS)
+    k = int(np.argmin(np.where(began, after, np.inf)))
+    joint_q = in_hand(model, graph.start_q[k], graph.touch[k * STEPS - 1])
+    return Starts(np.array([k]), joint_q[None], graph.start_qd[[k]])
 
 
 def make(context: Context) -> Learner:
@@ -77,14 +83,9 @@ def make(context: Context) -> Learner:
 
 def _smc(context: Context) -> Learner:
     c: BallConfig = context.config
-    return Smc(
-        task(context, c.smc.particles),
-        c.smc,
-        c.cycles,
-        c.iterations,
-        ball_in_hand(context.graph),
-        context.seed,
-    )
+    worlds = task(context, c.smc.particles)
+    begin = ball_in_hand(worlds.model, context.graph)
+    return Smc(worlds, c.smc, c.cycles, c.iterations, begin, context.seed)
 
 
 METHODS: dict[str, Callable[[Context], Learner]] = {"smc": _smc}
