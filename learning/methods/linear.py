@@ -132,4 +132,5 @@ STAGE = Stage(
     task=task,
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
+    uses=(samcon.STAGE.name,),
 )

@@ -111,10 +111,13 @@ class Run:
     def stage(self, stage: Stage) -> StageFolder:
         return StageFolder(self.folder / stage.name, stage)
 
-    def context(self, stage: Stage, config: Any, device: str = "cpu", workers: int = 1) -> Context:
-        """For a learner of a stage. Raises InputError where a stage that it needs has not been learned."""
+    def context(
+        self, stage: Stage, config: Any, device: str = "cpu", workers: int = 1, learns: bool = True
+    ) -> Context:
+        """For a learner of a stage, or only for its result. Raises InputError where a stage that it needs for
+        that has not been learned."""
         folder, needs = self.folder / stage.name, {}
-        for need in stage.needs:
+        for need in stage.needs if learns or stage.uses is None else stage.uses:
             if (kept := self.stage(stage).need(need)).exists():
                 needs[need] = read_arrays(kept, RESULT_REMEDY)
                 continue
@@ -137,7 +140,7 @@ class Run:
         stage = stages[name or (done or there)[-1]]
         folder = self.stage(stage)
         arrays = read_result(folder.path)
-        context = self.context(stage, folder.config())
+        context = self.context(stage, folder.config(), learns=False)
         with said_if_damaged(folder.path / RESULT, RESULT_REMEDY):
             return Learned(
                 self,

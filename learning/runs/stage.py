@@ -90,6 +90,8 @@ class Stage:
     """worlds in which it is tried"""
     needs: tuple[str, ...] = ()
     """stages whose results it starts from"""
+    uses: tuple[str, ...] | None = None
+    """those of them without which its own result does nothing; None for all"""
     ball: bool = False
     """only for a skill in which somebody plays with one"""
     save_iterations: int = 1

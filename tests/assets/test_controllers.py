@@ -14,7 +14,7 @@ from warpdribble.learning.tasks.follow import OpenLoop
 @pytest.mark.parametrize("name", shipped_controllers())
 def test_it_stands_where_the_open_loop_falls(name):
     """20 cycles from recorded states, arms and hands disturbed, with pushes that few survive without it."""
-    one = Run.load(name).learned(STAGES)
+    one = Run.load(name).learned(STAGES, "locomotion")
     task = one.task(64)
     pushed = Disturbance(push=150.0, push_every=2.0, arms=0.2, hands=18.0)
     trials = run_trials(task, one.controller, one.starts, 20, 3, 0.15, pushed)
@@ -26,12 +26,12 @@ def test_it_stands_where_the_open_loop_falls(name):
 @pytest.mark.parametrize("name", shipped_controllers())
 def test_it_stands_the_pushes_of_the_paper(name):
     """200 N for 0.2 s, from any side (P1 8)."""
-    one = Run.load(name).learned(STAGES)
+    one = Run.load(name).learned(STAGES, "locomotion")
     assert np.min(push_survival(one.task(256), one.controller, one.starts, 200.0)) >= 0.95
 
 
 def test_it_is_not_far_from_its_reference():
-    one = Run.load("dribble-right-authored").learned(STAGES)
+    one = Run.load("dribble-right-authored").learned(STAGES, "locomotion")
     trials = run_trials(one.task(16), one.controller, one.starts, 5)
     assert np.degrees(trials.angle_error) < 1.0  # per joint of legs and trunk
     assert trials.end_error < 0.015 and trials.drift < 0.01 and np.degrees(trials.astray) < 10.0

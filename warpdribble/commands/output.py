@@ -83,8 +83,8 @@ def write_outputs(
         say(f"replay    {replay} (open it in a browser)")
 
 
-def say_trajectory(model: Model, seen: Trajectory, root: str) -> Tracking:
-    """Say how it went, and measure it."""
+def say_trajectory(model: Model, seen: Trajectory, root: str, played: bool = False) -> Tracking:
+    """Say how it went, and measure it. played: a policy has the ball."""
     import numpy as np
 
     from ..learning.evaluate.tracking import track
@@ -107,5 +107,6 @@ def say_trajectory(model: Model, seen: Trajectory, root: str) -> Tracking:
     if "ball on ground" in found.contacts:
         ground = found.contacts["ball on ground"]
         bounces = int(np.sum(ground[1:] & ~ground[:-1]))
-        say(f"ball      {bounces} bounces (put in play, not yet controlled)")
+        how = "kept in play by what was learned" if played else "put in play, nobody controls it"
+        say(f"ball      {bounces} bounces ({how})")
     return found

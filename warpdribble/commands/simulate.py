@@ -62,7 +62,7 @@ class Simulate(ClipInput, Outputs):
         say(f"{'clip' if one.skill.is_clip else 'skill':9} {_title(one)}, {reference.duration:.2f} s")
         for note in (*model.notes, *one.notes):
             say(f"          {note}")
-        _check_length(reference, self.repeat)
+        _check_length(reference.duration, self.repeat)
         if self.repeat > 1:
             if one.cycle is None:
                 raise ValueError(f"--repeat {self.repeat}: the skill '{one.skill.name}' is not cyclic")
@@ -113,7 +113,7 @@ class Simulate(ClipInput, Outputs):
 
 @dataclass
 class Demo(Outputs):
-    """A player that has learned to stand dribbles, on its own feet; needs no data."""
+    """A player that has learned it dribbles, on its own feet; needs no data."""
 
     repeat: int = 5
     """How many dribbles."""
@@ -125,26 +125,25 @@ class Demo(Outputs):
     def run(self) -> int:
         import numpy as np
 
-        from ..learning import Disturbance, Locomotion, Run, Streams, cyclic_graph
-        from ..learning.evaluate.attempts import TRIES, starts
+        from ..learning import Disturbance, Run, Streams
+        from ..learning.evaluate.attempts import TRIES
         from ..learning.methods import STAGES
         from ..learning.tasks.disturbance import Disturber
-        from ..sims import Cycle, Model, authored_clip
 
         _check(self)
         check_range("--push", self.push, 0.0, 1e4)
-        model = Model.load("player")
-        clip = authored_clip(model, "dribble_right")
-        _check_length(clip.reference, self.repeat)
-        say(f"clip      authored dribble, right hand, {clip.reference.duration:.2f} s a cycle, legs learned")
-        graph = cyclic_graph(model, Cycle(clip.reference), model.roles.both("feet"))
+        one = Run.load(LEARNED).learned(STAGES)
+        cycle = one.graph.cycle * one.graph.period
+        _check_length(cycle, self.repeat)
+        say(f"skill     {one.skill['name']}, {cycle:.2f} s a cycle, learned")
         with compiling():
-            task = warmed(Locomotion(model, graph, TRIES, self.device))
-        legs = Run.load(LEARNED).learned(STAGES).controller
-        pushes = Disturber(Disturbance(push=self.push), Streams([np.random.default_rng(0)], TRIES))
-        begin = starts(model, clip.reference, TRIES, ball=True)
-        seen = _record(task, legs, begin, self.repeat * graph.cycle, pushes)
-        write_outputs(self, model, seen, say_trajectory(model, seen, "free"), "authored dribble", "free")
+            task = warmed(one.task(TRIES, self.device))
+        streams = Streams([np.random.default_rng(0)], TRIES)
+        pushes = Disturber(Disturbance(push=self.push), streams)
+        begin = one.starts.draw(streams)
+        seen = _record(task, one.controller, begin, self.repeat * one.graph.cycle, pushes)
+        tracking = say_trajectory(task.model, seen, "free", played=True)
+        write_outputs(self, task.model, seen, tracking, "authored dribble, learned", "free")
         say(
             "next      open the take in Blender (or any USD viewer); push: warpdribble demo --push 300;\n"
             "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"
@@ -162,9 +161,9 @@ def _check(command: Simulate | Demo) -> None:
     check_outputs(command.out)
 
 
-def _check_length(reference: Reference, repeat: int) -> None:
-    """Raise ValueError where a take would not fit into memory."""
-    most = max(1, int(LONGEST / reference.duration))
+def _check_length(duration: float, repeat: int) -> None:
+    """Raise ValueError where a take of cycles that last so long [s] would not fit into memory."""
+    most = max(1, int(LONGEST / duration))
     if repeat > most:
         raise ValueError(f"--repeat {repeat}: at most {most} for this clip ({LONGEST:.0f} s)")
 

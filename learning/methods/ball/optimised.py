@@ -48,6 +48,10 @@ class Optimised:
     def of(arrays: Arrays) -> Optimised:
         return Optimised(*(np.asarray(arrays[f.name]) for f in fields(Optimised)))
 
+    def last(self, count: int) -> Optimised:
+        """The last `count` fragments of it, or all."""
+        return Optimised(*(x[max(0, len(self) - count) :] for x in vars(self).values()))
+
     def distance(self, count: int) -> np.ndarray:
         """(cycles,) [m] mean distance of the fingers in H over each whole cycle of `count` fragments: the
         first term of Eq. 6."""

@@ -17,6 +17,7 @@ from warpdribble.skills.skill import parse_skill
 from warpdribble.takes.take import validate
 
 NAME = "dribble-right-authored"
+LEGS = ("--stage", "locomotion")
 SMALL = {"iterations": 6, "islands": 4, "particles": 32, "walk": 60, "check_every": 3, "trials": 32}
 
 
@@ -33,7 +34,7 @@ def small():
 def run(small, tmp_path_factory):
     """The folder of a run that the command made."""
     folder = tmp_path_factory.mktemp("learn") / "run"
-    assert main(["learn", NAME, "--out", str(folder)]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(folder)]) == 0
     return folder
 
 
@@ -56,7 +57,7 @@ def evaluated(capsys, run, *arguments):
 
 def test_learning_says_how_it_went_and_what_is_next(small, capsys, tmp_path):
     out = tmp_path / "run"
-    assert main(["learn", NAME, "--out", str(out), "--iterations", "4"]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(out), "--iterations", "4"]) == 0
     said = capsys.readouterr()
     for words in (
         "authored clip dribble_right",
@@ -71,10 +72,10 @@ def test_learning_says_how_it_went_and_what_is_next(small, capsys, tmp_path):
     checks = [line for line in said.err.splitlines() if line.startswith("iteration ")]
     assert [line.split(":")[0] for line in checks] == ["iteration 3 of 4", "iteration 4 of 4"]
     assert "survived, cost" in checks[0]
-    assert main(["learn", NAME, "--out", str(out), "--iterations", "5"]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(out), "--iterations", "5"]) == 0
     assert "goes on   after 4 iterations" in capsys.readouterr().out
     assert [row["iteration"] for row in read_rows(out / "locomotion")] == [1, 2, 3, 4, 5]
-    assert main(["learn", NAME, "--out", str(out), "--iterations", "5"]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(out), "--iterations", "5"]) == 0
     said = capsys.readouterr().out
     assert "goes on   after 5 iterations" in said and "learned   5 iterations" in said
     assert "TensorBoard" not in said
@@ -89,7 +90,7 @@ def test_a_run_that_is_stopped_says_how_to_go_on(small, capsys, tmp_path, monkey
         return iterate(self)
 
     monkeypatch.setattr(Samcon, "iterate", interrupted)
-    assert main(["learn", NAME, "--out", str(tmp_path / "run")]) == 130
+    assert main(["learn", NAME, *LEGS, "--out", str(tmp_path / "run")]) == 130
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.startswith("warpdribble: stopped after 2 iterations; saved in ")
     assert said.endswith("the same command goes on")
@@ -266,14 +267,16 @@ def test_folders_without_a_policy(capsys, tmp_path, command):
 
 @pytest.mark.parametrize("command", ["evaluate", "export"])
 def test_a_stage_that_was_not_learned(run, capsys, command):
+    said = refused(capsys, command, run, "--stage", "flying")
+    assert f"{run}: there is no stage 'flying'; there are locomotion, ball, linear; give another" in said
     said = refused(capsys, command, run, "--stage", "ball")
-    assert f"{run}: there is no stage 'ball'; there are locomotion; give another --stage" in said
+    assert f"{run}: has no policy yet: no ball was learned" in said
 
 
 def test_the_number_of_workers_does_not_matter(run, small, capsys, tmp_path):
     """The same policy, to the bit."""
     out = tmp_path / "run"
-    assert main(["learn", NAME, "--out", str(out), "--workers", "3"]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(out), "--workers", "3"]) == 0
     for name in ("policy.npz", "checkpoint.npz"):
         with np.load(run / "locomotion" / name) as one, np.load(out / "locomotion" / name) as two:
             for key in set(one.files) - {"seconds"}:
@@ -284,7 +287,7 @@ def test_a_folder_that_is_being_written_is_refused(run, capsys):
     from warpdribble.learning.runs.files import held
 
     with held(run):
-        said = refused(capsys, "learn", NAME, "--out", run, "--iterations", "9", late=True)
+        said = refused(capsys, "learn", NAME, *LEGS, "--out", run, "--iterations", "9", late=True)
     line = said.splitlines()[-1]
     assert re.search(r"is being written by process \d+ on \S+ since [-\d: ]+: wait until it is done; ", line)
     assert line.endswith("give another --out")
@@ -300,7 +303,7 @@ def test_a_damaged_checkpoint_is_said(run, capsys, tmp_path):
 
     shutil.copytree(run, tmp_path / "run")
     (tmp_path / "run" / "locomotion" / "checkpoint.npz").write_bytes(b"PK half")
-    said = refused(capsys, "learn", NAME, "--out", tmp_path / "run", "--iterations", "9", late=True)
+    said = refused(capsys, "learn", NAME, *LEGS, "--out", tmp_path / "run", "--iterations", "9", late=True)
     assert "checkpoint.npz: is damaged" in said
     assert said.endswith("delete it to learn from the start; give another --out\n")
 
@@ -314,7 +317,7 @@ def test_a_cycle_that_is_too_short_is_said(tmp_path, cmu_clip):
 @pytest.mark.slow
 def test_the_dribble_is_learned(capsys, tmp_path):
     run = tmp_path / "run"
-    assert main(["learn", NAME, "--out", str(run), "--iterations", "30"]) == 0
+    assert main(["learn", NAME, *LEGS, "--out", str(run), "--iterations", "30"]) == 0
     learned = evaluated(capsys, run, "--cycles", "30", "--trials", "64")
     blind = evaluated(capsys, run, "--cycles", "30", "--trials", "64", "--open-loop")
     assert learned["survived"] >= 48 and learned["survived"] > blind["survived"]
