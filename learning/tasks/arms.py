@@ -14,7 +14,7 @@ import numpy as np
 
 from ...sims.model import Model
 from ...sims.worlds import BAD_CONTACT, Watch, terms
-from ...sims.worlds.watch import gap, last, total
+from ...sims.worlds.watch import Folded, first, gap, height_of, last, total, trouble
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
@@ -62,10 +62,11 @@ USUAL = BallWeights()
 class Arms(Locomotion):
     """A player whose hands play with the ball along a control graph. legs: the policy of the legs.
 
-    state: what a policy feels, one of STATES. An action has ten numbers for each arm [rad; fingers: share of
-    the way from flat to fist]. The cost has the distance of the fingers from the ball over the time steps of
-    H, and how far ball and hands are from the reference; the ball is lost where it touches the player
-    elsewhere than on a hand, is too far from its reference, or out of reach at a checkpoint.
+    state: what a policy feels, one of STATES. closely: what happens to the ball inside a fragment is seen,
+    too (`trouble`, `height`), which costs some time. An action has ten numbers for each arm [rad; fingers:
+    share of the way from flat to fist]. The cost has the distance of the fingers from the ball over the time
+    steps of H, and how far ball and hands are from the reference; the ball is lost where it touches the
+    player elsewhere than on a hand, is too far from its reference, or out of reach at a checkpoint.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class Arms(Locomotion):
         threads: int | None = None,
         weights: BallWeights = USUAL,
         state: str = "reduced",
+        closely: bool = False,
     ):
         if state not in STATES:
             raise ValueError(f"there is no state '{state}'; there are {', '.join(STATES)}")
@@ -131,7 +133,10 @@ class Arms(Locomotion):
         sides = np.repeat([0, 1], len(FINGERS))
         soft = {tip: total(gap(tip, ball, radius), share * touch[:, h]) for tip, h in zip(tips, sides)}
         hard = {f"at {tip}": last(gap(tip, ball, radius), mark[:, h]) for tip, h in zip(tips, sides)}
-        self.watch = Watch(self.sim, soft | hard, len(touch))
+        close: dict[str, Folded] = {}
+        if closely:
+            close = {"trouble": first(trouble()), "height": last(height_of(ball), mark.any(axis=1))}
+        self.watch = Watch(self.sim, soft | hard | close, len(touch))
         self._tips = len(tips)
         self._moves = np.zeros((worlds, self.actions))
         self._before = np.zeros((worlds, self.actions))
@@ -140,6 +145,13 @@ class Arms(Locomotion):
         self.fingers = np.zeros(worlds)
         """(worlds,) [m] mean distance of the fingers from the ball in H of the last fragment (Eq. 7), NaN
         where it has none"""
+        self.missed = np.zeros(worlds, bool)
+        """(worlds,) a hand did not have the ball at a checkpoint of the last fragment"""
+        self.trouble = np.full(worlds, -1)
+        """(worlds,) step of the last fragment after which the world was first in trouble (fallen, or the ball
+        where it should not be), -1 where it was not; only where it is looked at closely"""
+        self.height = np.zeros(worlds)
+        """(worlds,) [m] of the ball at the last checkpoint of the last fragment; likewise"""
 
     def reset(self, starts: Starts, which: np.ndarray | None = None) -> None:
         super().reset(starts, which)
@@ -173,15 +185,17 @@ class Arms(Locomotion):
         seen = self.watch.read()
         held = self.held[k]
         self.fingers = np.where(held > 0, seen[:, : self._tips].sum(axis=1) / np.maximum(held, 1.0), np.nan)
-        at = seen[:, self._tips :].reshape(-1, 2, len(FINGERS)).mean(axis=2)
-        missed = np.any(self.marked[k] & (at > HELD), axis=1)
+        at = seen[:, self._tips : 2 * self._tips].reshape(-1, 2, len(FINGERS)).mean(axis=2)
+        self.missed = np.any(self.marked[k] & (at > HELD), axis=1)
+        if seen.shape[1] > 2 * self._tips:
+            self.trouble, self.height = seen[:, -2].astype(int), seen[:, -1]
         off = self.felt - self.goal[k]
         ball, speed = (np.linalg.norm(off[:, columns[n]], axis=1) for n in ("ball", "ball velocity"))
         hands = sum(
             np.linalg.norm(off[:, columns[f"hand {h}"]], axis=1) for h in self.model.roles.both("hands")
         )
         bad = self.felt[:, columns["status"]][:, 0].astype(int) & BAD_CONTACT != 0
-        failed |= bad | missed | ~(ball < w.lost)
+        failed |= bad | self.missed | ~(ball < w.lost)
         cost = (
             w.fingers * np.nan_to_num(self.fingers / (1.0 + np.maximum(self.fingers, 0.0) / self.near))
             + w.ball * ball
@@ -195,7 +209,8 @@ class Arms(Locomotion):
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)
-        self._before, self.fingers = self._before[sources], self.fingers[sources]
+        for name in ("_before", "fingers", "missed", "trouble", "height"):
+            setattr(self, name, getattr(self, name)[sources])
 
     def snapshot(self) -> dict[str, np.ndarray]:
         return super().snapshot() | {"before": np.array(self._before)}

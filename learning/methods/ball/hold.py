@@ -67,9 +67,12 @@ def in_hand(model: Model, joint_q: np.ndarray, hands: np.ndarray) -> np.ndarray:
         ahead, behind = np.split(misses(x + steps), 2)
         return (ahead - behind).T / (2.0 * STEP)
 
+    def miss(x: np.ndarray) -> np.ndarray:
+        return np.asarray(misses(np.tile(x, (2 * count, 1)))[0])
+
     reach = np.repeat([REACH, 1.0 - READY], [3, count - 3]), np.repeat([REACH, READY], [3, count - 3])
     x = least_squares(
-        lambda x: misses(np.tile(x, (2 * count, 1)))[0],
+        miss,
         np.zeros(count),
         slope,
         (-reach[1], reach[0]),
@@ -86,7 +89,7 @@ def closed(
     q = np.tile(np.asarray(joint_q, float), (len(by), 1))
     for i, hand in enumerate(np.flatnonzero(hands)):
         for finger, shares in enumerate(SHARES):
-            for name, way in signals[hand * len(FINGERS) + finger].items():
+            for name, way in signals[int(hand) * len(FINGERS) + finger].items():
                 own, turn = model.q_slice(name), np.outer(by[:, i] @ shares, way)
                 if model.joint_type(name) == "hinge":
                     q[:, own] += turn

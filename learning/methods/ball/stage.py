@@ -16,8 +16,11 @@ from ...runs.stage import Arrays, Context, Learner, Stage
 from ...starts import Starts
 from ...tasks.arms import USUAL, Arms, BallWeights
 from .. import samcon
+from . import newton
+from .newton import Newton, NewtonConfig
 from .hold import in_hand
 from .optimised import Optimised, Playback
+from .paper import Paper, PaperConfig, population
 from .smc import Smc, SmcConfig
 
 
@@ -26,12 +29,14 @@ class BallConfig:
     """Parameters of the search for a trajectory."""
 
     iterations: int = 300
-    """tries of a cycle, at most"""
+    """tries of a cycle, or of a window between checkpoints, at most"""
     method: str = "smc"
     """one of METHODS"""
     cycles: int = 100
     """to be found in a row (N_rep of P1 5.2)"""
     smc: SmcConfig = field(default=SmcConfig())
+    paper: PaperConfig = field(default=PaperConfig())
+    newton: NewtonConfig = field(default=NewtonConfig())
     weights: BallWeights = field(default=BallWeights())
 
 
@@ -46,6 +51,7 @@ def arms(
     threads: int | None = None,
     weights: BallWeights = USUAL,
     state: str = "reduced",
+    closely: bool = False,
 ) -> Arms:
     """Worlds of the player with the ball. Raises InputError for a graph without."""
     graph = context.graph
@@ -53,7 +59,7 @@ def arms(
         reason = "nobody plays with a ball here: nothing in the motion shows one"
         raise InputError(reason, hint="contact")
     player = Model.load("player")
-    return Arms(player, graph, worlds, legs(context), context.device, threads, weights, state)
+    return Arms(player, graph, worlds, legs(context), context.device, threads, weights, state, closely)
 
 
 def task(context: Context, worlds: int) -> Arms:
@@ -88,7 +94,23 @@ def _smc(context: Context) -> Learner:
     return Smc(worlds, c.smc, c.cycles, c.iterations, begin, context.seed)
 
 
-METHODS: dict[str, Callable[[Context], Learner]] = {"smc": _smc}
+def _paper(context: Context) -> Learner:
+    c: BallConfig = context.config
+    size = population(Model.load("player"), context.graph, c.paper)
+    worlds = arms(context, size, weights=c.weights, closely=True)
+    return Paper(worlds, c.paper, c.cycles, c.iterations, context.seed)
+
+
+def _newton(context: Context) -> Learner:
+    c: BallConfig = context.config
+    few, steps, slopes = (
+        arms(context, size, weights=c.weights, closely=True)
+        for size in newton.sizes(Model.load("player"), context.graph, c.newton)
+    )
+    return Newton(few, steps, slopes, c.newton, c.cycles, c.iterations, context.seed)
+
+
+METHODS: dict[str, Callable[[Context], Learner]] = {"smc": _smc, "paper": _paper, "newton": _newton}
 """How a trajectory is found."""
 
 

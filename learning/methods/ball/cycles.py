@@ -1,0 +1,180 @@
+"""Cycle after cycle of offsets, a window an iteration (P1 Fig. 6); how a window is optimised is another's."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...graph import STEPS
+from ...runs.stage import Arrays, Report
+from ...starts import Starts
+from ...tasks.arms import Arms
+from .hold import in_hand
+from .optimised import Optimised
+from .windows import Moment, windows_of
+
+SHRINK = 0.9
+"""[-] of what was found before, where a fragment is optimised anew (P1 5.1)"""
+MEMORY = 10
+"""times that a fragment was optimised after which its moving average forgets (Eq. 10)"""
+
+
+@dataclass
+class Window(Report):
+    """A window in numbers."""
+
+    found: bool
+    """else the player loses the ball whatever was tried, and that was the last window"""
+    distance: float
+    """[m] of the fingers from the ball in H, the first term of Eq. 6"""
+    offsets: float
+    """[rad] mean length of the offsets of the arms that act on the ball (Fig. 11)"""
+    rounds: int
+    """batches of candidates that were tried"""
+    samples_per_second: float
+    """fragments simulated per second of everything"""
+    outside: float
+    """share of the time that is not simulation"""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was found for a window."""
+
+    found: Optimised
+    after: Moment
+    """where it ended, when the next one begins"""
+    ahead: np.ndarray
+    """(n, 20) what the next window begins with"""
+
+
+def moved(mean: np.ndarray, action: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """The moving average of actions (n, 20) optimised for the `times`-th (n,) time (Eq. 10)."""
+    beta = 1.0 / np.minimum(times, MEMORY)[:, None]
+    return np.asarray((1.0 - beta) * mean + beta * action)
+
+
+class Cycles:
+    """Optimises window after window, each from where the one before ended; everything that its future
+    depends on is in `state`. tasks: worlds to try candidates in, all with the same graph. cycles: to be
+    found, in `tries` windows at most.
+
+    The first begins with the ball in the hands that have it at the first checkpoint."""
+
+    def __init__(self, tasks: Sequence[Arms], cycles: int, tries: int, seed: int = 0):
+        self.tasks, self.tries, self.seed = list(tasks), tries, seed
+        task = self.tasks[0]
+        graph, self.active = task.graph, task.active
+        self.windows = windows_of(graph)
+        self.wanted = cycles * len(self.windows)
+        k = int(self.windows[0][0])
+        self.begin = self.in_hand(k)
+        self.found: list[Optimised] = []
+        self.mean, self.times = np.zeros((graph.count, task.actions)), np.zeros(graph.count, int)
+        self.ahead = np.zeros((len(self.windows[0]), task.actions))
+        self.iteration, self.stuck = 0, False
+
+    def in_hand(self, k: int) -> Moment:
+        """The ball in the hand, when fragment k begins."""
+        task, graph = self.tasks[0], self.tasks[0].graph
+        assert graph.touch is not None
+        joint_q = in_hand(task.model, graph.start_q[k], graph.touch[k * STEPS - 1])
+        joint_qd = graph.start_qd[k]
+        task.reset(Starts(*(np.repeat(np.array([x]), task.worlds, axis=0) for x in (k, joint_q, joint_qd))))
+        return Moment.of(task, k)
+
+    @property
+    def done(self) -> bool:
+        return self.stuck or self.iteration >= min(self.wanted, self.tries)
+
+    def window(self, later: int = 0) -> np.ndarray:
+        """The fragments of the window that comes next, or of a later one."""
+        return self.windows[(self.iteration + later) % len(self.windows)]
+
+    def known(self, k: np.ndarray) -> np.ndarray:
+        """(n, 20) what windows of fragments k begin with that were optimised in an earlier cycle, if any."""
+        return np.asarray(SHRINK * self.mean[k])
+
+    def optimise(self) -> Chosen | None:
+        """The next window, begun at `begin` with `ahead`; None where the ball is lost whatever is tried."""
+        raise NotImplementedError
+
+    def iterate(self) -> Window:
+        """One window further."""
+        began, before, rounds = time.perf_counter(), self._spent, self.rounds
+        chosen = self.optimise()
+        if chosen is None:
+            self.stuck = True
+            distance = offsets = np.nan
+        else:
+            k, action = chosen.found.k, chosen.found.action
+            mean, times = self.mean.copy(), self.times.copy()
+            times[k] += 1
+            mean[k] = moved(mean[k], action, times[k])
+            self.mean, self.times = mean, times
+            self.found = [*self.found, chosen.found]
+            self.begin, self.ahead = chosen.after, chosen.ahead
+            self.iteration += 1
+            held = self.tasks[0].held[k]
+            distance = float(np.nansum(chosen.found.fingers * held) / held.sum())
+            offsets = float(chosen.found.offsets(self.active[k]).mean())
+        seconds = time.perf_counter() - began
+        samples, simulating = np.subtract(self._spent, before)
+        return Window(
+            self.iteration,
+            not self.stuck,
+            not self.stuck,
+            distance,
+            offsets,
+            self.rounds - rounds,
+            float(samples / seconds),
+            float(1.0 - simulating / seconds),
+        )
+
+    rounds = 0
+    """batches tried so far, in this process"""
+
+    @property
+    def _spent(self) -> tuple[float, float]:
+        """Fragments simulated so far, and the seconds that this took."""
+        return sum(task.samples for task in self.tasks), sum(task.simulating for task in self.tasks)
+
+    @property
+    def result(self) -> Arrays | None:
+        """All that was found, as of `Optimised`, and its first state to start from; None before the first."""
+        if not self.found:
+            return None
+        found = Optimised.joined(self.found)
+        first = {"k": found.k[:1], "joint_q": found.joint_q[:1], "joint_qd": found.joint_qd[:1]}
+        return found.arrays | {f"states.{name}": value for name, value in first.items()}
+
+    @property
+    def state(self) -> Arrays:
+        """Arrays by name, from which `restore` goes on exactly as this object would."""
+        found = Optimised.joined(self.found).arrays if self.found else {}
+        return {
+            "iteration": np.array(self.iteration),
+            "stuck": np.array(self.stuck),
+            "mean": self.mean,
+            "times": self.times,
+            "ahead": self.ahead,
+            **{f"begin.{name}": value for name, value in self.begin.arrays.items()},
+            **{f"found.{name}": value for name, value in found.items()},
+        }
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from what `state` was."""
+        if state["mean"].shape != self.mean.shape:
+            raise ValueError(f"mean has the shape {state['mean'].shape}")
+        self.mean, self.times, self.ahead = state["mean"], state["times"], state["ahead"]
+        self.iteration, self.stuck = int(state["iteration"]), bool(state["stuck"])
+        self.begin = Moment.from_arrays(_under("begin.", state))
+        found = _under("found.", state)
+        self.found = [Optimised.of(found)] if found else []
+
+
+def _under(first: str, arrays: Arrays) -> Arrays:
+    return {name.removeprefix(first): value for name, value in arrays.items() if name.startswith(first)}
