@@ -9,7 +9,7 @@ The papers' letters (P1: Liu and Hodgins 2018, with Liu et al. 2016 for locomoti
 | s | `obs`, `Task.observe` | the reduced state that a policy sees at a fragment's start |
 | a | `action`, `Course.offset` | what turns the drives' targets throughout a fragment |
 | E | `cost`, `Task.judge` | what a fragment cost |
-| w | `methods.em.Moments` | descendants of an action, its weight in the regression |
+| w | `policies.em.Moments` | descendants of an action, its weight in the regression |
 | N_s, n_save | `SamconConfig.particles`, `keep` | samples of a fragment, and how many of them go on |
 | H | `sims.Ball.touch` | when which hand has the ball, the soft set |
 | h_ref | `sims.Ball.heights` | the ball's height at each of its `checkpoints` (Eq. 8) |

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..runs.stage import Stage
 from . import linear, samcon
-from .ball.stage import STAGE as BALL
+from .ball import STAGE as BALL
 
 STAGES: dict[str, Stage] = {
     "locomotion": samcon.STAGE,

@@ -15,15 +15,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...sims.errors import InputError
+from ..ball.optimised import Optimised, observed, states_of
 from ..policies.linear import LinearPolicy
 from ..runs.stage import Arrays, Context, Stage
 from ..starts import Starts
 from ..tasks.arms import STATES, Arms, BallWeights
 from ..tasks.disturbance import CALM, Disturbance
 from . import samcon
-from .ball.optimised import Optimised, observed, states_of
-from .ball.stage import STAGE as BALL
-from .ball.stage import arms
+from .ball import STAGE as BALL
+from .ball import arms
 from .samcon import Samcon, SamconConfig, shared
 
 

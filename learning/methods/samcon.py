@@ -24,6 +24,7 @@ import numpy as np
 from ...sims.errors import InputError
 from ..choose import RandomWalk
 from ..evaluate.trials import Trials, record_starts, run_trials
+from ..policies.em import Moments, added, descendants, improve, select
 from ..policies.linear import Explore, LinearPolicy
 from ..rollout import Rollout
 from ..runs.stage import Context, Report, Stage
@@ -31,7 +32,6 @@ from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
 from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, legs_graph, locomotion_model
 from ..workers import Workers, shares
-from .em import Moments, added, descendants, improve, select
 
 T = TypeVar("T")
 RECORD_EVERY = 5

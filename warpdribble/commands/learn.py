@@ -192,7 +192,7 @@ class Shown:
                 f"{cycles} cycles",
                 f"fingers {getattr(report, 'fingers', math.nan):.1f} cm from the ball",
             ]
-        text = ", ".join([*parts, f"cost {cost:.2f}"])
+        text = ", ".join([*parts, f"cost {cost:.2f}"] if math.isfinite(cost) or not parts else parts)
         self.progress(report.iteration, f": {text}", self.total)
         if report.fresh and not sys.stderr.isatty():
             print(f"iteration {report.iteration} of {self.total}: {text}", file=sys.stderr, flush=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpdribble.learning.methods.ball.hold import CLEAR, closed, in_hand
+from warpdribble.learning.ball.hold import CLEAR, closed, in_hand
 from warpdribble.learning.tasks.fingers import FINGERS, READY, finger_signals
 from warpdribble.sims.model import pose
 from warpdribble.sims.worlds import Simulation

@@ -8,20 +8,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ....sims.errors import InputError
-from ....sims.model import Model
-from ...graph import STEPS, ControlGraph
-from ...policies.linear import LinearPolicy
-from ...runs.stage import Arrays, Context, Learner, Stage
-from ...starts import Starts
-from ...tasks.arms import USUAL, Arms, BallWeights
-from .. import samcon
-from . import newton
-from .newton import Newton, NewtonConfig
-from .hold import in_hand
-from .optimised import Optimised, Playback
-from .paper import Paper, PaperConfig, population
-from .smc import Smc, SmcConfig
+from ...sims.errors import InputError
+from ...sims.model import Model
+from ..ball import newton
+from ..ball.hold import in_hand
+from ..ball.newton import Newton, NewtonConfig
+from ..ball.optimised import Optimised, Playback
+from ..ball.paper import Paper, PaperConfig, population
+from ..ball.smc import Smc, SmcConfig
+from ..graph import STEPS, ControlGraph
+from ..policies.linear import LinearPolicy
+from ..runs.stage import Arrays, Context, Learner, Stage
+from ..starts import Starts
+from ..tasks.arms import USUAL, Arms, BallWeights
+from . import samcon
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class BallConfig:
 
     iterations: int = 300
     """tries of a cycle, or of a window between checkpoints, at most"""
-    method: str = "smc"
+    method: str = "newton"
     """one of METHODS"""
     cycles: int = 100
     """to be found in a row (N_rep of P1 5.2)"""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from warpdribble.learning.ball.windows import Moment, actions_of, attempt, windows_of
 from warpdribble.learning.graph import STEPS, ControlGraph
-from warpdribble.learning.methods.ball.windows import Moment, actions_of, attempt, windows_of
 from warpdribble.learning.starts import Starts
 from warpdribble.learning.tasks.arms import Arms
 from warpdribble.sims.worlds import BAD_CONTACT, FALL, NONFINITE

@@ -19,10 +19,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ....sims.errors import InputError
-from ....sims.model import Model
-from ...graph import STEPS, ControlGraph
-from ...tasks.arms import Arms, active_hands
+from ...sims.errors import InputError
+from ...sims.model import Model
+from ..graph import STEPS, ControlGraph
+from ..tasks.arms import Arms, active_hands
 from .cycles import Chosen, Cycles
 from .windows import Moment, Tried, actions_of, attempt, windows_of
 

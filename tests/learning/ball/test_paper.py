@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from warpdribble.learning.graph import STEPS
-from warpdribble.learning.methods.ball.paper import (
+from warpdribble.learning.ball.paper import (
     FAR,
     Pair,
     Paper,
@@ -14,7 +13,8 @@ from warpdribble.learning.methods.ball.paper import (
     reference_heights,
     search,
 )
-from warpdribble.learning.methods.ball.windows import Tried
+from warpdribble.learning.ball.windows import Tried
+from warpdribble.learning.graph import STEPS
 from warpdribble.learning.tasks.arms import Arms
 
 # A cycle of three fragments, the last one's with the checkpoint, gone through twice: six fragments, 30 steps.

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..policies.linear import LinearPolicy
+from .linear import LinearPolicy
 
 
 class Regression(Protocol):

@@ -8,16 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...graph import STEPS
-from ...runs.stage import Arrays, Report
-from ...starts import Starts
-from ...tasks.arms import Arms
+from ..graph import STEPS
+from ..runs.stage import Arrays, Report
+from ..starts import Starts
+from ..tasks.arms import Arms
 from .hold import in_hand
 from .optimised import Optimised
 from .windows import Moment, windows_of
 
 SHRINK = 0.9
 """[-] of what was found before, where a fragment is optimised anew (P1 5.1)"""
+FRESH = 20
+"""windows after which the result is written"""
 MEMORY = 10
 """times that a fragment was optimised after which its moving average forgets (Eq. 10)"""
 
@@ -28,8 +30,10 @@ class Window(Report):
 
     found: bool
     """else the player loses the ball whatever was tried, and that was the last window"""
-    distance: float
-    """[m] of the fingers from the ball in H, the first term of Eq. 6"""
+    cycles: int
+    """found so far"""
+    fingers: float
+    """[cm] mean distance from the ball in H, the first term of Eq. 6"""
     offsets: float
     """[rad] mean length of the offsets of the arms that act on the ball (Fig. 11)"""
     rounds: int
@@ -108,7 +112,7 @@ class Cycles:
         chosen = self.optimise()
         if chosen is None:
             self.stuck = True
-            distance = offsets = np.nan
+            fingers = offsets = np.nan
         else:
             k, action = chosen.found.k, chosen.found.action
             mean, times = self.mean.copy(), self.times.copy()
@@ -119,19 +123,20 @@ class Cycles:
             self.begin, self.ahead = chosen.after, chosen.ahead
             self.iteration += 1
             held = self.tasks[0].held[k]
-            distance = float(np.nansum(chosen.found.fingers * held) / held.sum())
+            fingers = 100.0 * float(np.nansum(chosen.found.fingers * held) / held.sum())
             offsets = float(chosen.found.offsets(self.active[k]).mean())
         seconds = time.perf_counter() - began
         samples, simulating = np.subtract(self._spent, before)
         return Window(
             self.iteration,
-            not self.stuck,
-            not self.stuck,
-            distance,
-            offsets,
-            self.rounds - rounds,
-            float(samples / seconds),
-            float(1.0 - simulating / seconds),
+            fresh=bool(self.found) and (self.done or self.iteration % FRESH == 0),
+            found=not self.stuck,
+            cycles=self.iteration // len(self.windows),
+            fingers=fingers,
+            offsets=offsets,
+            rounds=self.rounds - rounds,
+            samples_per_second=float(samples / seconds),
+            outside=float(1.0 - simulating / seconds),
         )
 
     rounds = 0

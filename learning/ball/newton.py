@@ -14,11 +14,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....sims.model import Model
-from ...graph import STEPS, ControlGraph
-from ...runs.stage import Arrays
-from ...tasks.arms import Arms, active_hands
-from ...tasks.fingers import FINGERS
+from ...sims.model import Model
+from ..graph import STEPS, ControlGraph
+from ..runs.stage import Arrays
+from ..tasks.arms import Arms, active_hands
+from ..tasks.fingers import FINGERS
 from . import paper
 from .cycles import Chosen, Cycles
 from .paper import PaperConfig

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from warpdribble.learning import STAGES, Run
-from warpdribble.learning.methods.ball.optimised import Optimised, observed, played, states_of
-from warpdribble.learning.methods.ball.smc import Smc, SmcConfig
-from warpdribble.learning.methods.ball.stage import ball_in_hand
+from warpdribble.learning.ball.optimised import Optimised, observed, played, states_of
+from warpdribble.learning.ball.smc import Smc, SmcConfig
+from warpdribble.learning.methods.ball import ball_in_hand
 from warpdribble.learning.methods.linear import regressed
 from warpdribble.learning.tasks.arms import Arms
 from warpdribble.skills import read_skill, skill_graph

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from ....sims.model import Model
-from ....sims.worlds import Signal, Simulation
-from ....sims.worlds.places import find_place
-from ...tasks.fingers import FINGERS, READY, SHARES, SIGNALS, finger_signals
+from ...sims.model import Model
+from ...sims.worlds import Signal, Simulation
+from ...sims.worlds.places import find_place
+from ..tasks.fingers import FINGERS, READY, SHARES, SIGNALS, finger_signals
 
 CLEAR = 0.004
 """[m] that the rest of the body stays away from the ball."""

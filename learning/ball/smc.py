@@ -15,13 +15,13 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from ...choose import Ahead
-from ...policies.linear import Explore, LinearPolicy
-from ...rollout import Rollout
-from ...runs.stage import Arrays, Report
-from ...starts import Starts, Streams
-from ...tasks.arms import Arms
-from ..em import Moments, descendants, improve, select
+from ..choose import Ahead
+from ..policies.em import Moments, descendants, improve, select
+from ..policies.linear import Explore, LinearPolicy
+from ..rollout import Rollout
+from ..runs.stage import Arrays, Report
+from ..starts import Starts, Streams
+from ..tasks.arms import Arms
 from .optimised import Optimised
 
 PATIENCE = 3

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from warpdribble.learning.methods.em import Moments, descendants, improve, select
 from warpdribble.learning.methods.samcon import SamconConfig
+from warpdribble.learning.policies.em import Moments, descendants, improve, select
 from warpdribble.learning.policies.linear import LinearPolicy
 
 FRAGMENTS, ACTIONS, STATES, ISLANDS = 3, 2, 4, 2
