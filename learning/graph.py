@@ -68,6 +68,8 @@ class ControlGraph:
     """(n,) rows of `touch` after which a hand must have the ball, in order"""
     heights: np.ndarray | None = None
     """(n,) [m] that the ball must reach at each of them, h_ref of Eq. 8"""
+    tracked: bool = False
+    """Virtual forces hold the root to it: no legs are learned."""
 
     def __post_init__(self) -> None:
         edges = np.asarray(self.edges, int).reshape(-1, 2)
@@ -93,6 +95,11 @@ class ControlGraph:
     def cycle(self) -> int:
         """Fragments of a cycle, the longest where there are several."""
         return max(span.count for span in self.spans)
+
+    @property
+    def ends(self) -> bool:
+        """Whether it has an end, where a fragment follows itself, as a clip's last does."""
+        return bool((self.edges[:, 0] == self.edges[:, 1]).any())
 
     @property
     def branches(self) -> bool:
@@ -136,6 +143,7 @@ class ControlGraph:
         with np.load(path) as file:
             values = {f.name: file[f.name] for f in fields(ControlGraph) if f.name in file}
         values |= {name: float(values[name]) for name in ("timestep", "stretch")}
+        values["tracked"] = bool(values.get("tracked", False))
         spans = tuple(Span(str(n), int(a), int(b)) for n, a, b in values.pop("spans", ()))
         return ControlGraph(**values, spans=spans)
 
@@ -252,14 +260,13 @@ def joined(graphs: Sequence[ControlGraph], transitions: Sequence[Transition]) ->
     arrays = ["targets", "start_q", "start_qd", "goal_q", "goal_qd"]
     if all(g.motion is not None for g in graphs):
         arrays.append("motion")
-    played: dict[str, np.ndarray] = {}
+    joint = {name: np.concatenate([getattr(g, name) for g in graphs]) for name in arrays}
     if all(g.touch is not None for g in graphs):
-        arrays += ["touch", "heights"]
+        joint |= {name: np.concatenate([getattr(g, name) for g in graphs]) for name in ("touch", "heights")}
         marks = [np.asarray(g.checkpoints) + STEPS * at for g, at in zip(graphs, first)]
-        played["checkpoints"] = np.concatenate(marks)
+        joint["checkpoints"] = np.concatenate(marks)
     return ControlGraph(
-        **played,
-        **{name: np.concatenate([getattr(g, name) for g in graphs]) for name in arrays},
+        **joint,  # type: ignore[arg-type]
         edges=np.concatenate([*edges, np.array(between, int).reshape(-1, 2)]),
         timestep=graphs[0].timestep,
         stretch=float(np.mean([g.stretch for g in graphs])),

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..graph import STEPS
 from ..runs.stage import Arrays, Report
 from ..starts import Starts
 from ..tasks.arms import Arms
 from .hold import in_hand
 from .optimised import Optimised
-from .windows import Moment, windows_of
+from .windows import Moment, holding, windows_of
 
 SHRINK = 0.9
 """[-] of what was found before, where a fragment is optimised anew (P1 5.1)"""
@@ -73,7 +72,7 @@ class Cycles:
         task = self.tasks[0]
         graph, self.active = task.graph, task.active
         self.windows = windows_of(graph)
-        self.wanted = cycles * len(self.windows)
+        self.wanted = (1 if graph.ends else cycles) * len(self.windows)
         k = int(self.windows[0][0])
         self.begin = self.in_hand(k)
         self.found: list[Optimised] = []
@@ -84,8 +83,7 @@ class Cycles:
     def in_hand(self, k: int) -> Moment:
         """The ball in the hand, when fragment k begins."""
         task, graph = self.tasks[0], self.tasks[0].graph
-        assert graph.touch is not None
-        joint_q = in_hand(task.model, graph.start_q[k], graph.touch[k * STEPS - 1])
+        joint_q = in_hand(task.model, graph.start_q[k], holding(graph, k))
         joint_qd = graph.start_qd[k]
         task.reset(Starts(*(np.repeat(np.array([x]), task.worlds, axis=0) for x in (k, joint_q, joint_qd))))
         return Moment.of(task, k)

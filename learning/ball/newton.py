@@ -111,7 +111,9 @@ class Newton(Cycles):
         self.goal = few.goal.copy()
         """(fragments, p) what the task feels where the reference ends each, with the ball in hand where a
         window does"""
-        for k, after in zip(self.windows, [*self.windows[1:], self.windows[0]]):
+        graph = few.graph
+        pairs = list(zip(self.windows, [*self.windows[1:], self.windows[0]]))
+        for k, after in pairs[:-1] if graph.ends else pairs:
             self.goal[k[-1]] = self.in_hand(int(after[0])).felt
         self.last = np.zeros_like(self.mean)
         """(fragments, 20) what was found last"""

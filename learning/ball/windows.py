@@ -16,14 +16,45 @@ from ..starts import Starts
 from ..tasks.arms import Arms
 from .optimised import Optimised
 
+LONGEST = 16
+"""Fragments of a window, unless nobody has the ball for so long."""
+
 
 def windows_of(graph: ControlGraph) -> list[np.ndarray]:
     """The fragments (n,) of each window of a cycle, the first of which begins after the first checkpoint;
-    each ends with the fragment of a checkpoint. Raises ValueError for a graph that is no cycle, or has
-    none."""
+    each ends with the fragment of a checkpoint, or before, while a hand has the ball, if it would be longer
+    than LONGEST. A clip's first begins when a hand first has the ball, its last ends with the clip. Raises ValueError for a graph that is neither a cycle
+    nor a clip, or has no checkpoint."""
+    return [part for window in _between_checkpoints(graph) for part in _short(graph, window)]
+
+
+def holding(graph: ControlGraph, k: int) -> np.ndarray:
+    """(2,) bool: the hands that should have the ball when fragment k begins."""
+    assert graph.touch is not None
+    return np.asarray(graph.touch[0 if k == 0 and graph.ends else k * STEPS - 1])
+
+
+def _short(graph: ControlGraph, window: np.ndarray) -> list[np.ndarray]:
+    """A window, or parts of it that end while a hand has the ball."""
+    assert graph.touch is not None
+    held = graph.touch[(window + 1) * STEPS - 1].any(axis=1)[:-1]
+    if len(window) <= LONGEST or not held.any():
+        return [window]
+    places = np.flatnonzero(held) + 1
+    cut = int(places[np.argmin(np.abs(places - len(window) / 2))])
+    return [part for half in np.split(window, [cut]) for part in _short(graph, half)]
+
+
+def _between_checkpoints(graph: ControlGraph) -> list[np.ndarray]:
     if graph.checkpoints is None or not len(graph.checkpoints):
         raise ValueError("the graph has no checkpoint: nothing says when a hand must have the ball")
     ends = set((np.asarray(graph.checkpoints) // STEPS).tolist())
+    if graph.ends:
+        begins = [k for k in range(graph.count) if holding(graph, k).any()]
+        if not begins:
+            raise ValueError("no hand has the ball where a fragment begins")
+        line = np.arange(begins[0], graph.count)
+        return [part for part in np.split(line, np.flatnonzero([k in ends for k in line]) + 1) if len(part)]
     cycle = [int(graph.follow(np.array([min(ends)]))[0])]
     while len(cycle) < graph.count and cycle[-1] != min(ends):
         cycle.append(int(graph.follow(np.array(cycle[-1:]))[0]))

@@ -4,10 +4,12 @@ play the longer the luckier it starts."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from ...sims.ball import Ball
 from ...sims.model import Model
 from ...sims.reference import Reference
 from ...sims.trajectory import Trajectory
@@ -41,14 +43,28 @@ def follow(
     if root == "free":
         return Follow(model, clip_graph(model, reference, model.roles.feet), worlds, device)
 
-    def held(graph: ControlGraph, worlds: int = 1) -> Follow:
-        task = Follow(model, graph, worlds, device)
-        task.sim.set_root_drive(*ROOT_DRIVE)
-        return task
+    return _held(model, tracked_graph(model, reference, device, progress=progress), worlds, device)
 
-    graph = clip_graph(model, reference, (), ROOT_DRIVE[1] / ROOT_DRIVE[0])
+
+def tracked_graph(
+    model: Model,
+    reference: Reference,
+    device: str = "cpu",
+    ball: Ball | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> ControlGraph:
+    """A reference as a graph whose root is held, with the targets that `refine` finds. ball: who plays with
+    it when. progress: of `refine`."""
+    graph = clip_graph(model, reference, (), ROOT_DRIVE[1] / ROOT_DRIVE[0], ball)
+    graph = replace(graph, tracked=True)
     begin = starts(model, reference, 1, ball=False)
-    return held(refine(model, reference, graph, held, begin, progress), worlds)
+    return refine(model, reference, graph, lambda g: _held(model, g, 1, device), begin, progress)
+
+
+def _held(model: Model, graph: ControlGraph, worlds: int, device: str) -> Follow:
+    task = Follow(model, graph, worlds, device)
+    task.sim.set_root_drive(*ROOT_DRIVE)
+    return task
 
 
 def starts(model: Model, reference: Reference, worlds: int, ball: bool) -> Starts:

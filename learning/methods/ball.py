@@ -16,11 +16,14 @@ from ..ball.newton import Newton, NewtonConfig
 from ..ball.optimised import Optimised, Playback
 from ..ball.paper import Paper, PaperConfig, population
 from ..ball.smc import Smc, SmcConfig
+from ..evaluate.attempts import ROOT_DRIVE
 from ..graph import STEPS, ControlGraph
-from ..policies.linear import LinearPolicy
+from ..rollout import Controller
 from ..runs.stage import Arrays, Context, Learner, Stage
 from ..starts import Starts
 from ..tasks.arms import USUAL, Arms, BallWeights
+from ..tasks.follow import OpenLoop
+from ..tasks.locomotion import STEERED
 from . import samcon
 
 
@@ -40,8 +43,10 @@ class BallConfig:
     weights: BallWeights = field(default=BallWeights())
 
 
-def legs(context: Context) -> LinearPolicy:
-    """The locomotion policy that the stage starts from."""
+def legs(context: Context) -> Controller:
+    """The locomotion policy that the stage starts from; none where the root is held."""
+    if context.graph.tracked:
+        return OpenLoop(STEERED)
     return samcon.learned(context, context.needs[samcon.STAGE.name])
 
 
@@ -59,7 +64,10 @@ def arms(
         reason = "nobody plays with a ball here: nothing in the motion shows one"
         raise InputError(reason, hint="contact")
     player = Model.load("player")
-    return Arms(player, graph, worlds, legs(context), context.device, threads, weights, state, closely)
+    made = Arms(player, graph, worlds, legs(context), context.device, threads, weights, state, closely)
+    if graph.tracked:
+        made.sim.set_root_drive(*ROOT_DRIVE)
+    return made
 
 
 def task(context: Context, worlds: int) -> Arms:

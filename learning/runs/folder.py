@@ -117,7 +117,9 @@ class Run:
         """For a learner of a stage, or only for its result. Raises InputError where a stage that it needs for
         that has not been learned."""
         folder, needs = self.folder / stage.name, {}
-        for need in stage.needs if learns or stage.uses is None else stage.uses:
+        graph = self.graph
+        wanted = stage.needs if learns or stage.uses is None else stage.uses
+        for need in () if graph.tracked and stage.ball else wanted:
             if (kept := self.stage(stage).need(need)).exists():
                 needs[need] = read_arrays(kept, RESULT_REMEDY)
                 continue
@@ -125,7 +127,7 @@ class Run:
                 reason = f"{stage.name} starts from what {need} has learned, and there is nothing yet"
                 raise InputError(reason, self.folder, "needs")
             needs[need] = read_result(self.folder / need)
-        return Context(self.graph, config, self.seed, device, workers, folder, needs)
+        return Context(graph, config, self.seed, device, workers, folder, needs)
 
     def learned(self, stages: Mapping[str, Stage], name: str = "") -> Learned:
         """What a stage has learned, by default the last of `stages` that has. Raises InputError where none

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...sims.model import Model
-from ...sims.worlds import BAD_CONTACT, Watch, terms
+from ...sims.worlds import BAD_CONTACT, NONFINITE, Watch, terms
 from ...sims.worlds.watch import Folded, first, gap, height_of, last, total, trouble
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
@@ -181,6 +181,8 @@ class Arms(Locomotion):
         has fallen, and where that is so (worlds,)."""
         w, columns = self._weights, self.columns
         _, failed = super().judge(k)
+        if self.graph.tracked:  # nobody falls who is held
+            failed = self.felt[:, columns["status"]][:, 0].astype(int) & NONFINITE != 0
         assert self.watch is not None
         seen = self.watch.read()
         held = self.held[k]

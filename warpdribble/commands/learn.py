@@ -24,9 +24,14 @@ class Learn:
     """Learn a policy for a skill, on the CPU or a GPU. Stopped at any moment, the same command goes on."""
 
     skill: Positional[str]
-    """Name of a skill (warpdribble skill list), or a skill's .toml file; a cyclic one."""
+    """Name of a skill (warpdribble skill list), a skill's .toml file, or a recorded clip. What is not cyclic
+    happens once, its root held by virtual forces; only the stage ball is for that."""
     out: Path
     """Folder of the run."""
+    frames: tuple[int, int] | None = None
+    """Of a clip: first and last frame of the part to use, counted from 0; -1 is the clip's last."""
+    cyclic: bool = False
+    """Of a clip: its ends are made to meet."""
     stage: str = ""
     """What to learn: locomotion, to stay up and follow the motion without the ball; ball, cycle after cycle
     of arms and fingers that keep it; linear, a policy that does. When empty, all that the skill needs, in
@@ -50,7 +55,6 @@ class Learn:
         from ..learning import Run
         from ..learning.methods import STAGES
         from ..sims.errors import InputError
-        from ..skills import read_skill
         from ..skills.graph import skill_fields, skill_text
 
         check_range("--seed", self.seed, 0, 2**32)
@@ -66,7 +70,7 @@ class Learn:
             raise ValueError(f"--iterations {self.iterations}: of which stage? name it with --stage")
         if self.method and self.stage not in ("", "ball"):
             raise ValueError(f"--method {self.method}: it is for the stage ball")
-        one = read_skill(self.skill)
+        one = self._skill()
         find_device(self.device)
         run = Run.begin(self.out, skill_fields(one), self.seed)
         say(f"skill     {one.name}: {one.description}")
@@ -78,6 +82,8 @@ class Learn:
         )
         plays = graph.touch is not None and bool(graph.touch.any())
         stages = [stage for stage in STAGES.values() if plays or not stage.ball]
+        if graph.tracked:
+            stages = [STAGES["ball"]]
         if self.stage:
             stages = [STAGES[self.stage]]
         elif not plays and one.ball:
@@ -93,6 +99,16 @@ class Learn:
                 )
         self._next(run)
         return 0
+
+    def _skill(self) -> Skill:
+        """The skill, or the clip as one that has no file yet."""
+        from ..skills import clip_skill, is_skill, read_skill
+
+        if is_skill(self.skill):
+            if self.frames or self.cyclic:
+                raise ValueError(f"--frames and --cyclic: '{self.skill}' is a skill, whose file says it")
+            return read_skill(self.skill)
+        return clip_skill(self.skill, self.frames or (0, -1), cyclic=self.cyclic)
 
     def _graph(self, one: Skill) -> Any:
         from ..skills import skill_graph

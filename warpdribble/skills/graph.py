@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..assets import path as asset
+from ..learning.evaluate.attempts import tracked_graph
 from ..learning.graph import ControlGraph, cyclic_graph
 from ..learning.tasks.fingers import with_ready_hands
 from ..sims.errors import InputError
@@ -39,16 +40,19 @@ def skill_text(skill: Skill) -> str:
 
 
 def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGraph, tuple[str, ...]]:
-    """The graph of a cyclic skill, and notes on it. data: folder of recordings, None for the usual one.
-    Raises InputError."""
+    """The graph of a cyclic skill, or of one that happens once, whose root is then held to it; and notes on
+    it. data: folder of recordings, None for the usual one. Raises InputError."""
     player = Model.load("player")
     one = stage_skill(player, skill, data)
-    if one.cycle is None:
-        reason = f"the skill '{skill.name}' is not cyclic: locomotion is learned on cycles"
-        raise InputError(reason, hint="cyclic")
-    cycle = one.cycle
+    reference = one.reference
     if one.ball is not None:
         plays = np.asarray(one.ball.touch.any(axis=0))
-        joint_q = with_ready_hands(player, cycle.reference.joint_q, plays)
-        cycle = replace(cycle, reference=replace(cycle.reference, joint_q=joint_q))
-    return cyclic_graph(player, cycle, player.roles.both("feet"), skill.name, one.ball), one.notes
+        reference = replace(reference, joint_q=with_ready_hands(player, reference.joint_q, plays))
+    if one.cycle is not None:
+        cycle = replace(one.cycle, reference=reference)
+        return cyclic_graph(player, cycle, player.roles.both("feet"), skill.name, one.ball), one.notes
+    if one.ball is None:
+        reason = f"the skill '{skill.name}' is not cyclic, and no ball shows: locomotion is learned on cycles"
+        raise InputError(reason, hint="cyclic")
+    notes = (*one.notes, "not cyclic: virtual forces hold the root, arms and ball are simulated")
+    return tracked_graph(player, reference, ball=one.ball), notes
