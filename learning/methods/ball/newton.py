@@ -48,6 +48,10 @@ class NewtonConfig:
     """how much more ball and hands count where the window ends"""
     hand: float = 0.1
     """[m] of a hand from its reference, there"""
+    room: float = 0.005
+    """[m] of what is missing to `clear`"""
+    clear: float = 0.003
+    """[m] from a forearm to the ball"""
     offset: float = 1.0
     """[rad] of an offset"""
     step: float = 0.01
@@ -218,6 +222,7 @@ class Newton(Cycles):
                 way = felt[rows][..., columns[f"to {side}_{finger}_tip"]]
                 length = np.linalg.norm(way, axis=-1, keepdims=True)
                 parts.append(share * way * (1.0 - task.model.ball_radius / np.maximum(length, TINY)) / c.tip)
+        parts.append(np.maximum(c.clear - tried.room[reached], 0.0) / c.room)
         flat = [part.transpose(1, 0, 2).reshape(len(x), -1) for part in parts]
         errors = np.concatenate([*flat, x / (c.offset * np.sqrt(x.shape[1]))], axis=1)
         return np.clip(np.nan_to_num(errors, nan=WORST), -WORST, WORST)
