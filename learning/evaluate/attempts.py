@@ -10,6 +10,7 @@ import numpy as np
 
 from ...sims.model import Model
 from ...sims.reference import Reference
+from ...sims.reference.soles import pressed
 from ...sims.trajectory import Trajectory
 from ..graph import ControlGraph, clip_graph
 from ..starts import Starts
@@ -37,7 +38,8 @@ def follow(
 ) -> Follow:
     """Worlds that follow a reference from its first row to its last. root "tracked": virtual forces hold the
     root to it, too, which carry the player's weight where its feet do not, and the targets are those that
-    `refine` finds. progress: of `refine`."""
+    `refine` finds, with the feet pressed to the ground as they have to be to carry it. progress: of
+    `refine`."""
     if root == "free":
         return Follow(model, clip_graph(model, reference, model.roles.feet), worlds, device)
 
@@ -46,9 +48,10 @@ def follow(
         task.sim.set_root_drive(*ROOT_DRIVE)
         return task
 
-    graph = clip_graph(model, reference, (), ROOT_DRIVE[1] / ROOT_DRIVE[0])
+    lead = ROOT_DRIVE[1] / ROOT_DRIVE[0]
+    graph = clip_graph(model, reference, (), lead)
     begin = starts(model, reference, 1, ball=False)
-    return held(refine(model, reference, graph, held, begin, progress), worlds)
+    return held(refine(model, pressed(model, reference), graph, held, begin, lead, progress), worlds)
 
 
 def starts(model: Model, reference: Reference, worlds: int, ball: bool) -> Starts:

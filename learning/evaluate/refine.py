@@ -4,6 +4,9 @@ and Miyazaki 1984).
 What a drive leaves of an error is the same each time the same motion is tried, so it can be added to the
 target in advance: u <- u + GAIN (e + kd / kp de/dt), which undoes the drive's lag. Errors above SMOOTH are
 contacts that differ from try to try, and are left.
+
+A root that is driven learns with the joints. Left alone it gives by millimetres, which is as much as soles
+give under the whole weight: it would decide by chance which foot is pressed to the ground, and when.
 """
 
 from __future__ import annotations
@@ -37,16 +40,20 @@ def refine(
     graph: ControlGraph,
     build: Callable[[ControlGraph], Follow],
     starts: Starts,
+    root_lead: float,
     progress: Callable[[int], object] | None = None,
 ) -> ControlGraph:
     """A clip's graph with the best targets of TRIES, each tried in the first world of what `build` makes of
-    it, from `starts`. progress: called with the tries done."""
+    it, from `starts`. root_lead [s]: damping over stiffness of the root's drive. progress: called with the
+    tries done."""
     rate, rows = 1.0 / graph.timestep, np.arange(1, len(graph.targets) + 1)
     wanted = reference.joint_q[np.minimum(rows, reference.frame_count - 1)]
     lead, driven = np.zeros(model.nv), np.zeros(model.nv, bool)
     for joint in model.joints:
         driven[joint.dof] = joint.kind != "free" and joint.kp > 0.0
         lead[joint.dof] = joint.kd / joint.kp if joint.kp > 0.0 else 0.0
+    root = model.dof_slice(model.root)
+    driven[root], lead[root] = True, root_lead
     places, begin = _places(model, wanted), _aside(model, starts)
     correction, tried, best, least = np.zeros((len(rows), model.nv)), graph, graph, np.inf
     for count in range(TRIES):
