@@ -48,6 +48,10 @@ class NewtonConfig:
     """how much more ball and hands count where the window ends"""
     hand: float = 0.1
     """[m] of a hand from its reference, there"""
+    room: float = 0.005
+    """[m] of what is missing to `clear`"""
+    clear: float = 0.003
+    """[m] from a forearm to the ball"""
     offset: float = 1.0
     """[rad] of an offset"""
     step: float = 0.01
@@ -115,6 +119,7 @@ class Newton(Cycles):
         pairs = list(zip(self.windows, [*self.windows[1:], self.windows[0]]))
         for k, after in pairs[:-1] if graph.ends else pairs:
             self.goal[k[-1]] = self.in_hand(int(after[0])).felt
+        self.room = config.room
         self.last = np.zeros_like(self.mean)
         """(fragments, 20) what was found last"""
         self.slopes: dict[int, np.ndarray] = {}
@@ -129,8 +134,11 @@ class Newton(Cycles):
         at = self._best(self.tasks[0], k, starts[:, self.active[k]])
         enough = self.config.good if first else max(self.config.good, self.config.enough * self.least[number])
         at, slope = self._descend(k, at, self.slopes.get(number), enough)
-        if not at.keeps:
-            at, slope = self._by_parts(k, starts[0])
+        for room in (self.config.room, np.inf):  # what keeps clear may also keep from getting there
+            if not at.keeps:
+                self.room = room
+                at, slope = self._by_parts(k, starts[0])
+        self.room = self.config.room
         chosen = self._chosen(at) if at.keeps else paper.optimised(self, self.tasks[1], self.config.search)
         if chosen is not None:
             least, self.last = self.least.copy(), self.last.copy()
@@ -220,6 +228,7 @@ class Newton(Cycles):
                 way = felt[rows][..., columns[f"to {side}_{finger}_tip"]]
                 length = np.linalg.norm(way, axis=-1, keepdims=True)
                 parts.append(share * way * (1.0 - task.model.ball_radius / np.maximum(length, TINY)) / c.tip)
+        parts.append(np.maximum(c.clear - tried.room[reached], 0.0) / self.room)
         flat = [part.transpose(1, 0, 2).reshape(len(x), -1) for part in parts]
         errors = np.concatenate([*flat, x / (c.offset * np.sqrt(x.shape[1]))], axis=1)
         return np.clip(np.nan_to_num(errors, nan=WORST), -WORST, WORST)

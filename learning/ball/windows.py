@@ -125,6 +125,8 @@ class Tried:
     """(n, worlds) no hand at the ball at a checkpoint"""
     failed: np.ndarray
     """(n, worlds) the task says so"""
+    room: np.ndarray
+    """(n, worlds, 2) [m] between the ball and both forearms; seen closely only"""
     trouble: np.ndarray
     """(n, worlds) step of the first bad contact or fall, -1 where there is none; seen closely only"""
     height: np.ndarray
@@ -173,7 +175,7 @@ def attempt(task: Arms, begin: Moment, k: np.ndarray, action: np.ndarray, count:
     after, lost = None, np.zeros(task.worlds, bool)
     joint_q, joint_qd = task.sim.joint_q, task.sim.joint_qd
     for fragment in rollout.fragments(len(k)):
-        seen = (task.felt, task.fingers, task.missed, fragment.failed, task.trouble, task.height)
+        seen = (task.felt, task.fingers, task.missed, fragment.failed, task.room, task.trouble, task.height)
         rows.append((joint_q, joint_qd, *seen))
         joint_q, joint_qd = task.sim.joint_q, task.sim.joint_qd
         if len(rows) == count:
@@ -181,6 +183,6 @@ def attempt(task: Arms, begin: Moment, k: np.ndarray, action: np.ndarray, count:
         lost |= task.missed
         if lost.all():
             break
-    names = ("joint_q", "joint_qd", "felt", "fingers", "missed", "failed", "trouble", "height")
+    names = ("joint_q", "joint_qd", "felt", "fingers", "missed", "failed", "room", "trouble", "height")
     columns = {name: np.stack(column) for name, column in zip(names, zip(*rows))}
     return Tried(k, action, after=after, **columns)

@@ -12,6 +12,7 @@ import numpy as np
 from ...sims.ball import Ball
 from ...sims.model import Model
 from ...sims.reference import Reference
+from ...sims.reference.soles import pressed
 from ...sims.trajectory import Trajectory
 from ..graph import ControlGraph, clip_graph
 from ..starts import Starts
@@ -39,7 +40,8 @@ def follow(
 ) -> Follow:
     """Worlds that follow a reference from its first row to its last. root "tracked": virtual forces hold the
     root to it, too, which carry the player's weight where its feet do not, and the targets are those that
-    `refine` finds. progress: of `refine`."""
+    `refine` finds, with the feet pressed to the ground as they have to be to carry it. progress: of
+    `refine`."""
     if root == "free":
         return Follow(model, clip_graph(model, reference, model.roles.feet), worlds, device)
 
@@ -55,10 +57,11 @@ def tracked_graph(
 ) -> ControlGraph:
     """A reference as a graph whose root is held, with the targets that `refine` finds. ball: who plays with
     it when. progress: of `refine`."""
-    graph = clip_graph(model, reference, (), ROOT_DRIVE[1] / ROOT_DRIVE[0], ball)
-    graph = replace(graph, tracked=True)
+    lead = ROOT_DRIVE[1] / ROOT_DRIVE[0]
+    graph = replace(clip_graph(model, reference, (), lead, ball), tracked=True)
     begin = starts(model, reference, 1, ball=False)
-    return refine(model, reference, graph, lambda g: _held(model, g, 1, device), begin, progress)
+    wanted = pressed(model, reference)
+    return refine(model, wanted, graph, lambda g: _held(model, g, 1, device), begin, lead, progress)
 
 
 def _held(model: Model, graph: ControlGraph, worlds: int, device: str) -> Follow:

@@ -14,7 +14,8 @@ import numpy as np
 
 from ...sims.model import Model
 from ...sims.worlds import BAD_CONTACT, NONFINITE, Watch, terms
-from ...sims.worlds.watch import Folded, first, gap, height_of, last, total, trouble
+from ...sims.worlds.places import rounded_tip
+from ...sims.worlds.watch import Folded, first, gap, height_of, last, least, total, trouble
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
@@ -135,7 +136,9 @@ class Arms(Locomotion):
         hard = {f"at {tip}": last(gap(tip, ball, radius), mark[:, h]) for tip, h in zip(tips, sides)}
         close: dict[str, Folded] = {}
         if closely:
-            close = {"trouble": first(trouble()), "height": last(height_of(ball), mark.any(axis=1))}
+            wrists = [rounded_tip(model, arm) for arm in _forearms(model)]
+            close = {f"room {i}": least(gap(end, ball, radius + r)) for i, (end, r) in enumerate(wrists)}
+            close |= {"trouble": first(trouble()), "height": last(height_of(ball), mark.any(axis=1))}
         self.watch = Watch(self.sim, soft | hard | close, len(touch))
         self._tips = len(tips)
         self._moves = np.zeros((worlds, self.actions))
@@ -150,6 +153,9 @@ class Arms(Locomotion):
         self.trouble = np.full(worlds, -1)
         """(worlds,) step of the last fragment after which the world was first in trouble (fallen, or the ball
         where it should not be), -1 where it was not; only where it is looked at closely"""
+        self.room = np.zeros((worlds, 2))
+        """(worlds, 2) [m] least room in the last fragment between the ball and the left, the right forearm
+        where the hand begins, which is the bad contact that comes first; likewise"""
         self.height = np.zeros(worlds)
         """(worlds,) [m] of the ball at the last checkpoint of the last fragment; likewise"""
 
@@ -190,7 +196,7 @@ class Arms(Locomotion):
         at = seen[:, self._tips : 2 * self._tips].reshape(-1, 2, len(FINGERS)).mean(axis=2)
         self.missed = np.any(self.marked[k] & (at > HELD), axis=1)
         if seen.shape[1] > 2 * self._tips:
-            self.trouble, self.height = seen[:, -2].astype(int), seen[:, -1]
+            self.room, self.trouble, self.height = seen[:, -4:-2], seen[:, -2].astype(int), seen[:, -1]
         off = self.felt - self.goal[k]
         ball, speed = (np.linalg.norm(off[:, columns[n]], axis=1) for n in ("ball", "ball velocity"))
         hands = sum(
@@ -211,7 +217,7 @@ class Arms(Locomotion):
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)
-        for name in ("_before", "fingers", "missed", "trouble", "height"):
+        for name in ("_before", "fingers", "missed", "room", "trouble", "height"):
             setattr(self, name, getattr(self, name)[sources])
 
     def snapshot(self) -> dict[str, np.ndarray]:
@@ -225,6 +231,10 @@ class Arms(Locomotion):
 ARMS = 14
 """Columns of both arms: shoulders, elbows, wrists; the fingers' follow."""
 RESTITUTION = 0.8
+
+
+def _forearms(model: Model) -> list[str]:
+    return [model.body_names[model.joint_body(elbow)] for elbow in model.roles.both("elbows")]
 
 
 def _spread() -> np.ndarray:

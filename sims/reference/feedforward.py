@@ -56,11 +56,9 @@ def holding_torques(model: Model, reference: Reference, feet: Sequence[str]) -> 
     """Joint torques (frames, nv) [N m] under which the reference carries itself; zero at free
     joints."""
     body_q = pose.forward(model, reference.joint_q)
-    root = model.joint_body(model.root)
-    own = model.descendants(root)
+    own = model.descendants(model.joint_body(model.root))
     turns = [Rotation.from_quat(body_q[:, b, 3:]) for b in range(model.nbody)]
-    com = np.stack([body_q[:, b, :3] + turns[b].apply(model.body_com[b]) for b in own], axis=1)
-    push = model.body_mass[own, None] * (_acceleration(com, reference.timestep) - model.gravity)
+    com, push = pushes(model, body_q, reference.timestep)
     ground = _ground_forces(model, body_q, com, push, [model.body(f) for f in feet])
 
     torque = np.zeros((reference.frame_count, model.nv))
@@ -77,6 +75,22 @@ def holding_torques(model: Model, reference: Reference, feet: Sequence[str]) -> 
         local = turns[joint.body].inv().apply(needed)
         torque[:, joint.dof] = local @ joint.axis[:, None] if joint.kind == "hinge" else local
     return torque
+
+
+def pushes(model: Model, body_q: np.ndarray, timestep: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of the root and what hangs on it, moving as body_q (frames, nbody, 7): centres of mass (frames, bodies,
+    3) [m], and the forces (frames, bodies, 3) [N] that carry and accelerate them."""
+    own = model.descendants(model.joint_body(model.root))
+    com = np.stack(
+        [body_q[:, b, :3] + Rotation.from_quat(body_q[:, b, 3:]).apply(model.body_com[b]) for b in own],
+        axis=1,
+    )
+    return com, model.body_mass[own, None] * (_acceleration(com, timestep) - model.gravity)
+
+
+def down(low: np.ndarray) -> np.ndarray:
+    """[-] Of what may carry, from 0 to 1: how much its lowest point at height `low` [m] lets it."""
+    return np.clip(1.5 - low / STANDING, 0.0, 1.0)
 
 
 def _acceleration(places: np.ndarray, timestep: float) -> np.ndarray:
@@ -104,14 +118,13 @@ def _ground_forces(
         turn = Rotation.from_quat(body_q[:, foot, 3:])
         middle = body_q[:, foot, :3] + turn.apply(model.first_shape(foot).pos)
         middles.append(middle * [1.0, 1.0, 0.0])
-        low = gaps.lowest_point(model, body_q, model.descendants(foot))
-        standing.append(np.clip(1.5 - low / STANDING, 0.0, 1.0))
-    down = np.array(standing)
+        standing.append(down(gaps.lowest_point(model, body_q, model.descendants(foot))))
+    carries = np.array(standing)
     if len(feet) == 2:
         across = middles[1] - middles[0]
         share = np.sum((point - middles[0]) * across, axis=1) / np.sum(across**2, axis=1)
-        down = down * [np.clip(1.0 - share, 0.02, 1.0), np.clip(share, 0.02, 1.0)]
-    share = down / np.maximum(down.sum(axis=0), 1e-9)
+        carries = carries * [np.clip(1.0 - share, 0.02, 1.0), np.clip(share, 0.02, 1.0)]
+    share = carries / np.maximum(carries.sum(axis=0), 1e-9)
     off = point - sum(s[:, None] * m for s, m in zip(share, middles))
     off *= np.minimum(1.0, LEVER / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-9))
     loaded = force * (force[:, 2:] > 0.0)

@@ -93,6 +93,9 @@ def retargeted(model: Model, motion: Motion, mapping: Mapping | None = None, ik:
         soft = low_pass_rotations(turned[root].as_quat(), motion.rate, mapping.smoothed[root])
         turned[root] = Rotation.from_quat(soft)
     joint_q[:, model.q_slice(model.root)] = _root(model, goals, mapping, turned)
+    if root in mapping.smoothed:
+        place = joint_q[:, model.q_slice(model.root)][:, :3]
+        place[:] = low_pass(place, motion.rate, mapping.smoothed[root])
     _fill_joints(model, joint_q, turned, mapping.smoothed)
     knees = {model.body_names[pose.limb_bodies(model, knee)[2]]: knee for knee in mapping.legs}
     toes = {name: _toe_joint(model, motion, mapping, name) for name in knees}

@@ -8,8 +8,10 @@ toes that bend back, then by the whole foot.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from scipy.ndimage import distance_transform_edt, maximum_filter1d
+from scipy.ndimage import distance_transform_edt, gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..signals import continuous, smoothstep
@@ -21,6 +23,8 @@ OVER, UP, TURN, TOES = 0.04, 0.015, 0.02, 0.012
 """[s] over which a foot comes to a stand, and leaves it: over the ground, upward, turning, its toes."""
 HIGH = 0.2
 """[m] From the ground up to this, the ankle's height counts more and more, the ball's less and less."""
+FLATTER = np.radians(10.0)
+"""By which toes that are up are lowered at most, rather than the foot lifted off its heel."""
 CLEAR, RISE = 0.01, 0.03
 """[m] by which a foot that moves clears the ground, at the latest so many [s] after it stood."""
 
@@ -33,6 +37,7 @@ def swinging(
     frames = len(tread.ankle)
     if not stands:
         return tread.ankle, tread.turn, tread.toes
+    tread, stands = _heel_within(foot, tread, stands, timestep)
     stood = standing(stands, frames)
     like = continuous(tread.turn.as_quat())
     ankle, quat, toes = tread.ankle.copy(), like.copy(), tread.toes.copy()
@@ -60,6 +65,33 @@ def swinging(
         lift = eased(short[:, None], np.zeros((frames, 1)), stood, UP / timestep)[:, 0]
     place[:, 2] += lift
     return place, turn, bent
+
+
+def _heel_within(foot: Foot, tread: Tread, stands: list[Stand], timestep: float) -> tuple[Tread, list[Stand]]:
+    """The same with toes that are up only as far as leaves room for the heel, whose edge is farther back than
+    a recorded heel's round: under a ball as high as recorded. By FLATTER at most."""
+    known, floor = [], []
+    for stand in stands:
+        flat = tread.ball[stand.rows][stand.pitch >= 0.0]
+        if len(flat):
+            known.append((stand.first + stand.last) // 2)
+            floor.append([np.median(flat)])
+    if not known:
+        return tread, stands
+    rows = np.arange(len(tread.ball))
+    over = tread.ball - _between(np.array(known), np.array(floor), rows)[:, 0]
+    over = over - np.where(standing(stands, len(rows)), 0.0, CLEAR)
+    least = -np.arcsin(np.clip(over / (foot.ball - foot.heel)[0], 0.0, 1.0))
+    least = gaussian_filter1d(least, TURN / timestep, mode="nearest")
+    by = gaussian_filter1d(_short(heading(tread.turn)[1], least), TURN / timestep, mode="nearest")
+    turn = tread.turn * Rotation.from_euler("y", by[:, None])
+    lower = [replace(s, pitch=s.pitch + _short(s.pitch, least[s.rows])) for s in stands]
+    return replace(tread, turn=turn), lower
+
+
+def _short(pitch: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """[rad] by which toes that are up (pitch below 0) come down to `least` (below 0)."""
+    return np.clip(least - np.minimum(pitch, 0.0), 0.0, FLATTER) * (pitch < 0.0)
 
 
 def _ball(

@@ -35,14 +35,22 @@ def find_place(model: Model, where: str | Place) -> Place:
 
 
 def tip(model: Model, body: str) -> Place:
-    """The end of a body's capsule that is farther from its joint, as a finger's tip. Raises ValueError where
-    it has no capsule."""
-    shape = next((s for s in model.shapes if s.body == model.body(body) and s.kind == "capsule"), None)
-    if shape is None:
+    """The end of a body's capsules that is farthest from its joint, as a finger's tip. Raises ValueError
+    where it has no capsule."""
+    return rounded_tip(model, body)[0]
+
+
+def rounded_tip(model: Model, body: str) -> tuple[Place, float]:
+    """The same, and the radius [m] of the capsule."""
+    ends = []
+    for s in model.shapes:
+        if s.body == model.body(body) and s.kind == "capsule":
+            along = Rotation.from_quat(s.quat).apply([0.0, 0.0, s.size[1]])
+            ends += [(s.pos + along, float(s.size[0])), (s.pos - along, float(s.size[0]))]
+    if not ends:
         raise ValueError(f"body '{body}' has no capsule, so no tip")
-    along = Rotation.from_quat(shape.quat).apply([0.0, 0.0, shape.size[1]])
-    ends = shape.pos + along, shape.pos - along
-    return Place(body, _triple(max(ends, key=lambda end: float(np.linalg.norm(end)))))
+    end, radius = max(ends, key=lambda end: float(np.linalg.norm(end[0])))
+    return Place(body, _triple(end)), radius
 
 
 def _triple(v: np.ndarray) -> tuple[float, float, float]:

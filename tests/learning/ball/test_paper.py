@@ -41,7 +41,8 @@ def seen(**what):
     trouble[2, 3], trouble[3:, 3] = 3, 0
     trouble[4, 1] = 2
     rows = np.zeros((6, WORLDS, 1))
-    parts = dict(fingers=fingers, missed=missed, failed=missed, trouble=trouble, height=height) | what
+    parts = dict(fingers=fingers, missed=missed, failed=missed, trouble=trouble, height=height)
+    parts |= {"room": np.zeros((6, WORLDS, 2))} | what
     action = parts.pop("action", np.zeros((6, WORLDS, 20)))
     return Tried(K, action, rows, rows, rows, after=None, **parts)
 

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from warpdribble.learning.ball.windows import Moment, actions_of, attempt, windows_of
 from warpdribble.learning.graph import STEPS, ControlGraph
 from warpdribble.learning.starts import Starts
 from warpdribble.learning.tasks.arms import Arms
+from warpdribble.sims.model import pose
 from warpdribble.sims.worlds import BAD_CONTACT, FALL, NONFINITE
 
 
@@ -86,23 +88,33 @@ def test_a_moment_goes_on_to_the_bit(task):
             )
 
 
-def test_the_first_trouble_and_the_height_are_those_of_single_steps(task, full):
+def test_trouble_height_and_room_are_those_of_single_steps(task, full):
     k = np.arange(8, 12)
     random = np.random.default_rng(1)
     action = 0.2 * random.standard_normal((4, 8, 20))
     tried = attempt(task, begun(task, 8), k, action, 4)
     begun(task, 8)
+    arms = [full.body(f"{side}_lower_arm") for side in "lr"]
+    ends = [next(s for s in full.shapes if s.name == f"{side}_lower_arm_b") for side in "lr"]
+    room = np.full((4, 8, 2), np.inf)
     trouble, height = np.full((4, 8), -1), np.zeros((4, 8))
     ball = full.q_slice(full.roles.one("ball_joint")).start
     (checkpoint,) = task.graph.checkpoints
     for i in range(4):
         for step in range(STEPS):
             task.advance(np.full(8, k[i]), action[i], step, 1)
+            body_q = pose.forward(full, task.sim.joint_q)
+            for side, (body, end) in enumerate(zip(arms, ends)):
+                tip = np.array(end.pos) * (1.0 + end.size[1] / np.linalg.norm(end.pos))
+                at = body_q[:, body, :3] + Rotation.from_quat(body_q[:, body, 3:]).apply(tip)
+                off = np.linalg.norm(at - task.sim.joint_q[:, ball : ball + 3], axis=1)
+                room[i, :, side] = np.minimum(room[i, :, side], off - full.ball_radius - end.size[0])
             bad = task.sim.status & (BAD_CONTACT | FALL | NONFINITE) != 0
             trouble[i] = np.where(bad & (trouble[i] < 0), step, trouble[i])
             if STEPS * k[i] + step == checkpoint:
                 height[i] = task.sim.joint_q[:, ball + 2]
     np.testing.assert_array_equal(tried.trouble, trouble[: len(tried.trouble)])
+    np.testing.assert_allclose(tried.room, room[: len(tried.room)], atol=1e-5)
     at = checkpoint // STEPS - 8
     np.testing.assert_allclose(tried.height[at], height[at], rtol=1e-6)
     assert (trouble > 0).any() and (trouble < 0).any()

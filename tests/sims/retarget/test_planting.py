@@ -92,6 +92,23 @@ def test_a_swing_is_as_high_as_it_was_recorded(foot):
     assert np.abs(place - recorded.ankle)[middle, 2].max() < 0.01
 
 
+def test_toes_that_are_up_leave_room_for_the_heel(foot):
+    """Who is recorded lands on a heel that ends 5 cm nearer to the ball of the foot: under toes as high as
+    theirs and turned up as far, our heel would be in the ground; lifted off it, the ball is 2 cm higher."""
+    recorded, times = steps(foot), np.arange(150) * 0.01
+    pitch = -0.4 * np.interp(times, [0.6, 0.8, 1.0, 1.2], [0.0, 1.0, 1.0, 0.0])
+    turn = Rotation.from_euler("y", pitch[:, None])
+    lever = (foot.ball - foot.heel)[0] - 0.05
+    ball = recorded.ankle + foot.ball
+    ball[:, 2] = foot.drop + lever * np.sin(-pitch) + 0.03 * np.sin(np.pi * np.clip(2 * times - 1, 0, 1)) ** 2
+    stands, place, own, _ = planted(foot, tread(foot, ball - turn.apply(foot.ball), turn))
+    swing = (times > 0.65) & (times < 0.97)
+    assert not standing(stands, 150)[swing].any()
+    assert np.abs((place + own.apply(foot.ball) - ball)[swing, 2]).max() < 0.005
+    assert np.degrees((own.inv() * turn).magnitude()).max() < 10.5
+    assert lowest(foot, place, own, np.zeros(150)).min() > -1e-3
+
+
 @pytest.mark.parametrize(("up", "toes"), [(0.0, 0.0), (0.02, 0.6), (0.03, -0.4)])
 def test_what_moves_clears_the_ground(foot, up, toes):
     """A recorded foot that shuffles, or whose toes hang."""

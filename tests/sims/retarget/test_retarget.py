@@ -259,6 +259,23 @@ def test_toes_follow_the_recording_and_it_is_said_which(player):
     assert retargeted(player, replace(motion, joint_names=names), given).toes["l_foot"] == "LeftSpur"
 
 
+def test_hips_that_shake_from_frame_to_frame_are_still(player):
+    """By half a centimetre, as CMU's do, on a sway that stays."""
+    times = np.arange(360) / 120.0
+    sway = np.zeros((360, 3))
+    sway[:, 1] = 0.05 * np.sin(2.0 * np.pi * times)
+    shaken = sway + 0.005 * np.where(np.arange(360) % 2, 1.0, -1.0)[:, None] * [1.0, 0.0, 0.0]
+    root = player.q_slice("root")
+    at = player.zero_pose[player.body("pelvis"), :3]
+    clean, noisy = (retarget(player, person(player, 360, root=at + way), ik=False) for way in (sway, shaken))
+    off = (noisy.joint_q - clean.joint_q)[:, root]
+    assert np.abs(off[20:-20]).max() < 5e-4
+    bare = read_mapping("cmu")
+    bare = replace(bare, smoothed={k: v for k, v in bare.smoothed.items() if k != "pelvis"})
+    raw = retarget(player, person(player, 360, root=at + sway), bare, ik=False)
+    assert np.abs((clean.joint_q - raw.joint_q)[20:-20, root]).max() < 1e-3
+
+
 def test_a_hand_that_is_recorded_the_wrong_way_round_does_not_flip(player):
     """A wrist beyond its range, up to half a turn and over: broken, but no reason to turn over in a row."""
     angle = np.pi + 0.6 * np.sin(np.arange(241) / 20.0)
