@@ -23,8 +23,8 @@ LONGEST = 16
 def windows_of(graph: ControlGraph) -> list[np.ndarray]:
     """The fragments (n,) of each window of a cycle, the first of which begins after the first checkpoint;
     each ends with the fragment of a checkpoint, or before, while a hand has the ball, if it would be longer
-    than LONGEST. A clip's first begins when a hand first has the ball, its last ends with the clip. Raises ValueError for a graph that is neither a cycle
-    nor a clip, or has no checkpoint."""
+    than LONGEST. A clip's first begins when a hand first has the ball, its last ends with the clip. Raises
+    ValueError for a graph that is neither a cycle nor a clip, or has no checkpoint."""
     return [part for window in _between_checkpoints(graph) for part in _short(graph, window)]
 
 
