@@ -27,8 +27,8 @@ MEMORY = 10
 class Window(Report):
     """A window in numbers."""
 
-    found: bool
-    """else the player loses the ball whatever was tried, and that was the last window"""
+    found: int
+    """1; 0: the player loses the ball whatever was tried, and that was the last window"""
     cycles: int
     """found so far"""
     fingers: float
@@ -128,7 +128,7 @@ class Cycles:
         return Window(
             self.iteration,
             fresh=bool(self.found) and (self.done or self.iteration % FRESH == 0),
-            found=not self.stuck,
+            found=int(not self.stuck),
             cycles=self.iteration // len(self.windows),
             fingers=fingers,
             offsets=offsets,
