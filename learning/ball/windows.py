@@ -36,9 +36,10 @@ def holding(graph: ControlGraph, k: int) -> np.ndarray:
 
 def _short(graph: ControlGraph, window: np.ndarray) -> list[np.ndarray]:
     """A window, or parts of it that end while a hand has the ball."""
-    assert graph.touch is not None
+    if len(window) <= LONGEST or graph.touch is None:
+        return [window]
     held = graph.touch[(window + 1) * STEPS - 1].any(axis=1)[:-1]
-    if len(window) <= LONGEST or not held.any():
+    if not held.any():
         return [window]
     places = np.flatnonzero(held) + 1
     cut = int(places[np.argmin(np.abs(places - len(window) / 2))])

@@ -48,6 +48,8 @@ class Evaluate:
     """Where to simulate: cpu, cuda:0, ..."""
 
     def run(self) -> int:
+        import numpy as np
+
         from ..learning import Disturbance, Run, run_trials
         from ..learning.evaluate.pushes import FORCES, PLAYERS, push_table
         from ..learning.methods import STAGES
@@ -92,6 +94,8 @@ class Evaluate:
             "seed": self.seed,
             "survived": int(trials.survived.sum()),
             "lived": float(trials.lived.mean()),
+            "cycles_lasted_median": self.cycles * float(np.median(trials.lived)),
+            "cycles_lasted_most": self.cycles * float(trials.lived.max()),
             "cost": trials.cost,
             "angle_error_deg": math.degrees(trials.angle_error),
             "end_error_cm": 100.0 * trials.end_error,
@@ -134,6 +138,8 @@ def _text(report: dict[str, Any]) -> list[str]:
     def shown(key: str, unit: str) -> str:
         return "-" if report[key] is None else f"{report[key]:.2f} {unit}"
 
+    if report["stage"] == "ball" and report["noise"] > 0.0:
+        say("          what was found is an open loop: --noise 0 plays it back from where it began")
     policy = "targets alone" if report["open_loop"] else f"best policy of {report['iterations']} iterations"
     lines = [
         f"run       {report['run']}: {report['skill']}, {policy}",
@@ -141,7 +147,8 @@ def _text(report: dict[str, Any]) -> list[str]:
         f"speed noise {report['noise']:g}, pushes up to {report['push']:g} N, "
         f"arms {report['arms']:g} rad, hands {report['hands']:g} N, seed {report['seed']}",
         f"survived  {report['survived']} of {report['trials']}, "
-        f"{100.0 * report['lived']:.1f} % of the time lived",
+        f"{100.0 * report['lived']:.1f} % of the time lived; the median lasted "
+        f"{report['cycles_lasted_median']:.4g} cycles, the longest {report['cycles_lasted_most']:.4g}",
         f"tracking  joints {shown('angle_error_deg', 'degrees')}, "
         f"feet and head {shown('end_error_cm', 'cm')}, while standing",
         f"way       {shown('pace_percent', '%')} of the reference's pace, "

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpdribble.learning.ball.windows import Moment, actions_of, attempt, windows_of
+from warpdribble.learning.ball.windows import LONGEST, Moment, actions_of, attempt, holding, windows_of
 from warpdribble.learning.graph import STEPS, ControlGraph
 from warpdribble.learning.starts import Starts
 from warpdribble.learning.tasks.arms import Arms
@@ -138,3 +138,37 @@ def test_who_looks_not_closely_sees_the_same_otherwise(task, full, dribbled, leg
     np.testing.assert_array_equal(a.joint_q, b.joint_q)
     np.testing.assert_array_equal(a.fingers, b.fingers)
     assert (b.trouble == -1).all()
+
+
+def clip(count, touch, marks):
+    """A graph that happens once, as far as windows look at it."""
+    after = np.minimum(np.arange(count) + 1, count - 1)
+    held = np.zeros((count * STEPS, 2), bool)
+    for first, last in touch:
+        held[first:last, 1] = True
+    rows = np.zeros((count, 1))
+    edges, still = np.stack([np.arange(count), after], axis=1), np.zeros((count * STEPS, 1))
+    marked = {"checkpoints": np.array(marks), "heights": np.ones(len(marks))}
+    return ControlGraph(still, rows, rows, rows, rows, edges, 0.01, motion=still, touch=held, **marked)
+
+
+def test_windows_of_a_clip_begin_with_the_first_hold_and_end_with_it():
+    graph = clip(12, touch=[(12, 24), (45, 50)], marks=[20, 47])
+    assert graph.ends
+    assert [w.tolist() for w in windows_of(graph)] == [[3, 4], [5, 6, 7, 8, 9], [10, 11]]
+    assert holding(graph, 3).tolist() == [False, True] and not holding(graph, 0).any()
+
+
+def test_a_clip_that_begins_in_the_hand():
+    graph = clip(6, touch=[(0, 12)], marks=[10])
+    assert holding(graph, 0).tolist() == [False, True]
+    assert [w.tolist() for w in windows_of(graph)] == [[0, 1, 2], [3, 4, 5]]
+
+
+def test_long_windows_are_cut_while_a_hand_has_the_ball():
+    graph = clip(40, touch=[(0, 200)], marks=[4])
+    parts = windows_of(graph)
+    assert np.concatenate(parts).tolist() == list(range(40))
+    assert max(len(part) for part in parts[1:]) <= LONGEST
+    free = clip(40, touch=[(0, 8)], marks=[4])
+    assert [len(part) for part in windows_of(free)] == [1, 39], "nobody has it: nowhere to cut"
