@@ -98,7 +98,7 @@ class Point:
 
 class Newton(Cycles):
     """Windows one by one. few, steps, slopes: tasks of as many worlds as starts, steps and differences are
-    tried at once, seen closely."""
+    tried at once, seen closely. searches: where no step leads to the ball, `paper` may."""
 
     def __init__(
         self,
@@ -109,9 +109,10 @@ class Newton(Cycles):
         cycles: int = 100,
         tries: int = 300,
         seed: int = 0,
+        searches: bool = True,
     ):
         super().__init__([few, steps, slopes], cycles, tries, seed)
-        self.config = config
+        self.config, self.searches = config, searches
         self.goal = few.goal.copy()
         """(fragments, p) what the task feels where the reference ends each, with the ball in hand where a
         window does"""
@@ -139,7 +140,11 @@ class Newton(Cycles):
                 self.room = room
                 at, slope = self._by_parts(k, starts[0])
         self.room = self.config.room
-        chosen = self._chosen(at) if at.keeps else paper.optimised(self, self.tasks[1], self.config.search)
+        chosen = None
+        if at.keeps:
+            chosen = self._chosen(at)
+        elif self.searches:
+            chosen = paper.optimised(self, self.tasks[1], self.config.search)
         if chosen is not None:
             least, self.last = self.least.copy(), self.last.copy()
             if at.keeps:

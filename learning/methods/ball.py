@@ -16,6 +16,7 @@ from ..ball.newton import Newton, NewtonConfig
 from ..ball.optimised import Optimised, Playback
 from ..ball.paper import Paper, PaperConfig, population
 from ..ball.smc import Smc, SmcConfig
+from ..ball.usual import Usual
 from ..evaluate.attempts import ROOT_DRIVE
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
@@ -33,7 +34,7 @@ class BallConfig:
 
     iterations: int = 300
     """tries of a cycle, or of a window between checkpoints, at most"""
-    method: str = "newton"
+    method: str = "usual"
     """one of METHODS"""
     cycles: int = 100
     """to be found in a row (N_rep of P1 5.2)"""
@@ -95,7 +96,7 @@ def make(context: Context) -> Learner:
     return METHODS[c.method](context)
 
 
-def _smc(context: Context) -> Learner:
+def _smc(context: Context) -> Smc:
     c: BallConfig = context.config
     worlds = task(context, c.smc.particles)
     begin = ball_in_hand(worlds.model, context.graph)
@@ -109,16 +110,27 @@ def _paper(context: Context) -> Learner:
     return Paper(worlds, c.paper, c.cycles, c.iterations, context.seed)
 
 
-def _newton(context: Context) -> Learner:
+def _newton(context: Context, searches: bool = True) -> Newton:
     c: BallConfig = context.config
     few, steps, slopes = (
         arms(context, size, weights=c.weights, closely=True)
         for size in newton.sizes(Model.load("player"), context.graph, c.newton)
     )
-    return Newton(few, steps, slopes, c.newton, c.cycles, c.iterations, context.seed)
+    return Newton(few, steps, slopes, c.newton, c.cycles, c.iterations, context.seed, searches)
 
 
-METHODS: dict[str, Callable[[Context], Learner]] = {"smc": _smc, "paper": _paper, "newton": _newton}
+def _usual(context: Context) -> Learner:
+    if context.graph.ends:
+        return _newton(context)
+    return Usual(_newton(context, searches=False), lambda: _smc(context))
+
+
+METHODS: dict[str, Callable[[Context], Learner]] = {
+    "usual": _usual,
+    "newton": _newton,
+    "smc": _smc,
+    "paper": _paper,
+}
 """How a trajectory is found."""
 
 

@@ -37,7 +37,7 @@ class Learn:
     of arms and fingers that keep it; linear, a policy that does. When empty, all that the skill needs, in
     this order."""
     method: str = ""
-    """How the stage ball finds its cycles: smc (the usual one), paper or newton."""
+    """How the stage ball finds its cycles: usual, newton, smc or paper (docs/dribbling.md)."""
     seed: int = 0
     """Of everything random; the same seed gives the same policy."""
     iterations: int | None = None

@@ -1,0 +1,76 @@
+"""The usual way to a trajectory: Gauss-Newton steps, which are exact and fast where they work, and where they
+do not hold the ball closely, as in a run, the walk of particles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..runs.stage import Arrays
+from .cycles import Window
+from .newton import Newton
+from .smc import Smc
+
+LOOSE = 3.0
+"""[cm] Fingers farther from the ball than this, over the first cycle, do not have it."""
+
+
+class Usual:
+    """Learns as `newton` does; once its first cycle is not found, or is loose, as the walk that `then` makes,
+    from the beginning."""
+
+    def __init__(self, newton: Newton, then: Callable[[], Smc]):
+        self.then, self.before = then, 0
+        self.now: Newton | Smc = newton
+        self.fingers: list[float] = []
+
+    @property
+    def iteration(self) -> int:
+        return self.before + self.now.iteration
+
+    @property
+    def done(self) -> bool:
+        return self.now.done
+
+    def iterate(self) -> Window:
+        """One window or cycle further."""
+        now = self.now
+        report = now.iterate()
+        if isinstance(now, Smc):
+            return Window(
+                self.iteration,
+                report.fresh,
+                found=int(now.lost == 0),
+                cycles=report.cycles,
+                fingers=report.fingers,
+                offsets=report.offsets,
+                rounds=1,
+                samples_per_second=report.samples_per_second,
+                outside=report.outside,
+            )
+        self.fingers.append(report.fingers)
+        if (now.stuck and not now.found) or (len(self.fingers) == len(now.windows) and self._loose()):
+            self.before, self.now = max(1, now.iteration), self.then()
+            return replace(report, iteration=self.iteration, fresh=False)
+        return report
+
+    def _loose(self) -> bool:
+        return not float(np.mean(self.fingers)) <= LOOSE
+
+    @property
+    def result(self) -> Arrays | None:
+        return self.now.result
+
+    @property
+    def state(self) -> Arrays:
+        walks = isinstance(self.now, Smc)
+        own = {"walks": walks, "before": self.before, "fingers": self.fingers}
+        return self.now.state | {f"usual.{name}": np.array(value) for name, value in own.items()}
+
+    def restore(self, state: Arrays) -> None:
+        self.before, self.fingers = int(state["usual.before"]), list(state["usual.fingers"])
+        if state["usual.walks"]:
+            self.now = self.then()
+        self.now.restore({name: value for name, value in state.items() if not name.startswith("usual.")})
