@@ -22,13 +22,9 @@ class Usual:
     from the beginning."""
 
     def __init__(self, newton: Newton, then: Callable[[], Smc]):
-        self.then, self.before = then, 0
+        self.then, self.before, self.iteration = then, 0, 0
         self.now: Newton | Smc = newton
         self.fingers: list[float] = []
-
-    @property
-    def iteration(self) -> int:
-        return self.before + self.now.iteration
 
     @property
     def done(self) -> bool:
@@ -36,28 +32,31 @@ class Usual:
 
     def iterate(self) -> Window:
         """One window or cycle further."""
-        now = self.now
-        report = now.iterate()
-        if isinstance(now, Smc):
-            return Window(
-                self.iteration,
-                report.fresh,
-                found=int(now.lost == 0),
-                cycles=report.cycles,
-                fingers=report.fingers,
-                offsets=report.offsets,
-                rounds=1,
-                samples_per_second=report.samples_per_second,
-                outside=report.outside,
-            )
+        if isinstance(self.now, Smc):
+            return self._walked(self.now)
+        now, report = self.now, self.now.iterate()
         self.fingers.append(report.fingers)
-        if (now.stuck and not now.found) or (len(self.fingers) == len(now.windows) and self._loose()):
-            self.before, self.now = max(1, now.iteration), self.then()
-            return replace(report, iteration=self.iteration, fresh=False)
+        first = len(self.fingers) == len(now.windows)
+        if (now.stuck and not now.found) or (first and not float(np.mean(self.fingers)) <= LOOSE):
+            self.before, self.now = len(self.fingers), self.then()
+            report = replace(report, iteration=self.before, fresh=False)
+        self.iteration = report.iteration
         return report
 
-    def _loose(self) -> bool:
-        return not float(np.mean(self.fingers)) <= LOOSE
+    def _walked(self, now: Smc) -> Window:
+        report = now.iterate()
+        self.iteration = self.before + now.iteration
+        return Window(
+            self.iteration,
+            report.fresh,
+            found=int(now.lost == 0),
+            cycles=report.cycles,
+            fingers=report.fingers,
+            offsets=report.offsets,
+            rounds=1,
+            samples_per_second=report.samples_per_second,
+            outside=report.outside,
+        )
 
     @property
     def result(self) -> Arrays | None:
@@ -74,3 +73,4 @@ class Usual:
         if state["usual.walks"]:
             self.now = self.then()
         self.now.restore({name: value for name, value in state.items() if not name.startswith("usual.")})
+        self.iteration = self.before + self.now.iteration
