@@ -41,7 +41,7 @@ class LinearConfig(SamconConfig):
     sigma: float = 0.05
     least_sigma: float = 0.02
     open_loop: int = 0
-    speed_noise: float = 0.05
+    speed_noise: float = 0.1
     disturbance: Disturbance = CALM
     check_every: int = 5
     check_cycles: int = 50

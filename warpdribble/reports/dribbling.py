@@ -25,8 +25,8 @@ from ..learning.tasks.arms import Arms
 from .markers import check_page, write_measured
 
 TRIALS = 100
-CYCLES = 600
-"""that a trial lasts at most; more than the 571 that P1's best linear policy lasted"""
+CYCLES = 200
+"""that a trial lasts at most"""
 CURVE = "offsets.png"
 MEASURED = "measured-ball.json"
 PUBLISHED = {
