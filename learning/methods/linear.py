@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...sims.errors import InputError
 from ..ball.optimised import Optimised, observed, states_of
 from ..policies.linear import LinearPolicy
 from ..runs.stage import Arrays, Context, Stage
@@ -106,7 +105,7 @@ def make(context: Context) -> Linear:
     """The learner of a graph, in worlds shared out among the workers."""
     c: LinearConfig = context.config
     if c.state not in STATES:
-        raise InputError(f"there is no state '{c.state}'; there are {', '.join(STATES)}", hint="state")
+        raise ValueError(f"there is no state '{c.state}'; there are {', '.join(STATES)}")
     found = Optimised.of(context.needs[BALL.name])
     tasks, trial_tasks = shared(context, lambda worlds, threads: task(context, worlds, threads))
     return Linear(tasks, trial_tasks, c, found, context.seed)

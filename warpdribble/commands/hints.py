@@ -22,6 +22,8 @@ HINTS = {
     "rate": "say which with --rate",
     "repairs": "give others with --repair",
     "mapping": "give another --mapping",
+    "contact": "say who has it when under [contact] in the skill's file",
+    "method": "give another --method",
     "seed": "try another --seed",
 }
 """Hint -> what it means here, for `sims.errors.InputError`."""

@@ -89,7 +89,7 @@ WRONG = {
     "skill's frames": (lambda a: stage_skill(a.player, a.mine(f'clip = "{a.clip}"\nframes = [0, 999]')), ""),
     "skill's units": (lambda a: stage_skill(a.player, a.mine(f'clip = "{a.clip}"\nunits = "mile"')), ""),
     "not cyclic": (
-        lambda a: skill_graph(a.mine('authored = "waist"')),
+        lambda a: skill_graph(a.mine('authored = "waist"\nball = false')),
         "take one of those that warpdribble skill list says are",
     ),
     "taken": (lambda a: Run.begin(a.write("notes.txt").parent, {"name": "x"}), "give another --out"),

@@ -201,7 +201,7 @@ def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
         ("gone.toml", "no such file"),
         (
             "once.toml",
-            "the skill 'mine' is not cyclic: locomotion is learned on cycles; "
+            "the skill 'mine' is not cyclic, and no ball shows: locomotion is learned on cycles; "
             "take one of those that warpdribble skill list says are",
         ),
         ("lost.toml", "clip: no file 'lost.bvh' in "),
@@ -209,7 +209,7 @@ def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
 )
 def test_what_cannot_be_learned(capsys, tmp_path, monkeypatch, skill, said):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "once.toml").write_text('name = "mine"\nauthored = "waist"\n')
+    (tmp_path / "once.toml").write_text('name = "mine"\nauthored = "waist"\nball = false\n')
     (tmp_path / "lost.toml").write_text('name = "mine"\nclip = "lost.bvh"\ncyclic = true\n')
     assert said in refused(capsys, "learn", skill, "--out", "run")
     assert not list(tmp_path.glob("run/*"))
