@@ -83,10 +83,10 @@ def cost(tried: Tried, held: np.ndarray, h_ref: np.ndarray, active: np.ndarray) 
     stop = np.where(tried.missed.any(axis=0), tried.missed.argmax(axis=0), total)
     frames = (np.arange(n)[:, None] <= stop) * held[tried.k[:n]][:, None]
     D = np.nan_to_num(tried.fingers, nan=FAR, posinf=FAR)
-    distance = np.sum(D * frames, axis=0) / frames.sum(axis=0)
+    distance = np.sum(D * frames, axis=0) / np.maximum(frames.sum(axis=0), 1)
     arms = active[tried.k].reshape(total, 2, -1)[:, :, 0]
     chi = np.linalg.norm(tried.action.reshape(total, worlds, 2, -1), axis=3)
-    length = np.einsum("nwh,nh->w", chi, arms / arms.sum())
+    length = np.einsum("nwh,nh->w", chi, arms / max(arms.sum(), 1))
     return Cost(distance, length, _helper(tried, h_ref, stop))
 
 
@@ -96,9 +96,11 @@ def _helper(tried: Tried, h_ref: np.ndarray, stop: np.ndarray) -> np.ndarray:
     n, worlds = tried.missed.shape
     checks = np.flatnonzero(np.isfinite(h_ref[tried.k]))
     N_check = (checks[:, None] >= stop).sum(axis=0)
-    at = checks[np.minimum(np.searchsorted(checks, stop), len(checks) - 1)]
-    h_ball = np.nan_to_num(tried.height[at, np.arange(worlds)], nan=-FAR)
-    short = np.maximum(h_ref[tried.k[at]] - h_ball, 0.0)
+    short = np.zeros(worlds)
+    if len(checks):  # the last windows of a clip may have none
+        at = checks[np.minimum(np.searchsorted(checks, stop), len(checks) - 1)]
+        h_ball = np.nan_to_num(tried.height[at, np.arange(worlds)], nan=-FAR)
+        short = np.maximum(h_ref[tried.k[at]] - h_ball, 0.0)
     row = np.arange(n)[:, None]
     T_0 = STEPS * len(tried.k)
     T_cont = np.where((tried.trouble >= 0) & (row <= stop), STEPS * row + tried.trouble, T_0).min(axis=0)

@@ -170,3 +170,10 @@ def test_a_pair_is_never_taken_that_loses_the_ball(full, dribbled, legs):
     lost = Paper(paper.tasks[0], PaperConfig(generations=1, searches=2))
     report = lost.iterate()
     assert not report.found and lost.done and lost.result is None and report.rounds == 2
+
+
+def test_a_clip_s_end_without_checkpoint_and_hold_costs_only_what_goes_wrong():
+    """Nobody has the ball, and nothing has to be reached: what is left is the time after a bad contact."""
+    found = cost(seen(missed=np.zeros((6, WORLDS), bool)), 0.0 * HELD, np.full(3, np.nan), ACTIVE)
+    np.testing.assert_array_equal(found.distance, 0.0)
+    np.testing.assert_allclose(found.helper, [0.0, (30 - 22) / 30, 0.0, (30 - 13) / 30], rtol=1e-12)
