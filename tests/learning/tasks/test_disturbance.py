@@ -27,6 +27,7 @@ class Notes:
         offset = np.zeros((worlds, ACTIONS + ARMS), np.float32)
         push = np.zeros((worlds, len(BODIES), 3), np.float32)
         self.course = SimpleNamespace(columns=ACTIONS + ARMS, offset=offset, push=push)
+        self.others = offset[:, ACTIONS:]
 
 
 def streams(seed=1, worlds=WORLDS, group=1):
