@@ -59,7 +59,8 @@ class Follow:
         """Simulate steps first ... first + count - 1 of fragments k (worlds,)."""
         began = time.perf_counter()
         self.course.offset[:, : action.shape[1]] = action
-        self.course.step(count, k * STEPS + first, self.watch)
+        looks = (self.watch,) if self.watch else ()
+        self.course.step(count, k * STEPS + first, *looks)
         wp.synchronize_device(self.sim.device)
         self.simulating += time.perf_counter() - began
         self.samples += self.worlds if first + count == STEPS else 0

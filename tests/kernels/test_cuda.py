@@ -62,7 +62,7 @@ def test_cuda_agrees_with_cpu(model):
 def walk(device):
     """What is felt after a shipped policy went ten fragments in twelve worlds, two of them pushed, and copied
     in between."""
-    learned = Run.load("dribble-right-authored").learned(STAGES)
+    learned = Run.load("dribble-right-authored").learned(STAGES, "locomotion")
     task = learned.task(12, device)
     streams = Streams([np.random.default_rng(0)], 12)
     rollout = Rollout(task, learned.controller, RandomWalk(streams), learned.starts.draw(streams))

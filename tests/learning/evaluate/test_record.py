@@ -19,7 +19,7 @@ from warpdribble.sims.planar import composed, planar, relative
 
 @pytest.fixture(scope="module")
 def learned():
-    return Run.load("dribble-right-authored").learned(STAGES)
+    return Run.load("dribble-right-authored").learned(STAGES, "locomotion")
 
 
 def streams(seed, worlds=1):

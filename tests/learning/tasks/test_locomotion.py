@@ -115,7 +115,7 @@ def costs(task, joint_q, **weights):
     """Of states at the end of fragment 0, with these weights alone."""
     worlds = task(len(joint_q), weights=replace(ZERO, **weights))
     step = worlds.course.step
-    worlds.course.step = lambda count, rows, watch: None
+    worlds.course.step = lambda count, rows: None
     put(worlds, joint_q)
     k = np.zeros(len(joint_q), int)
     worlds.advance(k, np.zeros((len(k), worlds.actions)))
@@ -193,7 +193,7 @@ def test_who_has_failed(task, graph, off):
     q = np.tile(graph.goal_q[0], (3, 1))
     worlds = task(3)
 
-    def step(count, rows, watch):
+    def step(count, rows):
         place = worlds.sim.port("joint_q").numpy()
         place[:] = q
         place[1, 2] += off
