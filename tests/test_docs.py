@@ -297,7 +297,7 @@ def test_moved_names_have_arrived():
         (test_names_exist, "call `sims.Simulation.stop`"),
         (test_names_exist, "`warpdribble.nothing.there`, `warpdribble.clips.read_all`"),
         (test_files_exist, "in `sims/dribble.py`"),
-        (test_files_exist, "read dribbling.md"),
+        (test_files_exist, "read shooting.md"),
         (test_links_lead_somewhere, "[here](nowhere.md)"),
         (test_links_lead_somewhere, "# Head\n[here](#hand)"),
         (test_modules_that_run_exist, "`python -m warpdribble.reports.all`"),

@@ -18,7 +18,7 @@ QUANTITIES = {
     "impulse": "impulse",
     "knock": "knock",
     "full": "full",
-    "torque": "asked",
+    "torque": "torque",
     "broken": "broken",
     "fallen": "fallen",
     "fumbled": "fumbled",
