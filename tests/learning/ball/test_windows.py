@@ -45,7 +45,7 @@ def test_checkpoints_of_one_fragment_end_one_window():
     ("graph", "said"),
     [
         (cycle(6, []), "no checkpoint"),
-        (cycle(4, [3], after=[1, 2, 0, 2]), "no cycle"),
+        (cycle(4, [3], after=[1, 2, 3, 2]), "no cycle"),
         (cycle(4, [3, 17], after=[1, 0, 3, 2]), "no cycle"),
     ],
 )
