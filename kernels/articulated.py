@@ -56,8 +56,7 @@ def take_out_turn(
     U = turn(b.I, s)
     V = Motion(b.V.w - v * s, b.V.v)
     world.s[g, j] = s
-    net = force + world.joint_f[g, j] - dot(s, b.p.n)
-    return take_out(world, g, j, b, U, dot(s, U.n) + load, net, v, V, h)
+    return take_out(world, g, j, b, U, dot(s, U.n) + load, force - dot(s, b.p.n), v, V, h)
 
 
 @wp.func
@@ -68,8 +67,7 @@ def take_out_shift(
     U = slide(b.I, s)
     V = Motion(b.V.w, b.V.v - v * s)
     world.s[g, j] = s
-    net = force + world.joint_f[g, j] - dot(s, b.p.f)
-    return take_out(world, g, j, b, U, dot(s, U.f) + load, net, v, V, h)
+    return take_out(world, g, j, b, U, dot(s, U.f) + load, force - dot(s, b.p.f), v, V, h)
 
 
 @wp.func
@@ -85,12 +83,14 @@ def free_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     spin = pd(tree, j + 3, fill(tree.dof_kp[j + 3]) * away, w, none, zero3())
     away = load3(world.target, g, iq) - load3(world.q, g, iq)
     push = pd(tree, j, fill(tree.dof_kp[j]) * away, v, none, zero3())
-    b = take_out_turn(world, g, j + 5, b, column(R, 2), w.z, spin.force.z, spin.load, h)
-    b = take_out_turn(world, g, j + 4, b, column(R, 1), w.y, spin.force.y, spin.load, h)
-    b = take_out_turn(world, g, j + 3, b, column(R, 0), w.x, spin.force.x, spin.load, h)
-    b = take_out_shift(world, g, j + 2, b, unit3(2), v.z, push.force.z, push.load, h)
-    b = take_out_shift(world, g, j + 1, b, unit3(1), v.y, push.force.y, push.load, h)
-    b = take_out_shift(world, g, j, b, unit3(0), v.x, push.force.x, push.load, h)
+    f = spin.force + load3(world.joint_f, g, j + 3)
+    b = take_out_turn(world, g, j + 5, b, column(R, 2), w.z, f.z, spin.load, h)
+    b = take_out_turn(world, g, j + 4, b, column(R, 1), w.y, f.y, spin.load, h)
+    b = take_out_turn(world, g, j + 3, b, column(R, 0), w.x, f.x, spin.load, h)
+    f = push.force + load3(world.joint_f, g, j)
+    b = take_out_shift(world, g, j + 2, b, unit3(2), v.z, f.z, push.load, h)
+    b = take_out_shift(world, g, j + 1, b, unit3(1), v.y, f.y, push.load, h)
+    b = take_out_shift(world, g, j, b, unit3(0), v.x, f.x, push.load, h)
     return b
 
 
@@ -133,7 +133,7 @@ def ball_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
             sy = where_lt(zero, halt.load, R * row(axes, 1), sy)
             sz = where_lt(zero, halt.load, R * row(axes, 2), sz)
     w = R * v
-    f = R * drive.force
+    f = R * (drive.force + load3(world.joint_f, g, j))  # along the link's axes, whatever those of the motion
     k = drive.load
     b = take_out_turn(world, g, j + 2, b, sz, dot(sz, w), dot(sz, f), k, h)
     b = take_out_turn(world, g, j + 1, b, sy, dot(sy, w), dot(sy, f), k, h)
@@ -158,7 +158,7 @@ def hinge_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
         upper = stop(tree, tree.link_upper[i] - q, v, weight)
         lower = stop(tree, q - tree.link_lower[i], neg(v), weight)
         drive = Push(drive.force + upper.force - lower.force, drive.load + upper.load + lower.load)
-    return take_out_turn(world, g, j, b, s, v, drive.force, drive.load, tree.h)
+    return take_out_turn(world, g, j, b, s, v, drive.force + world.joint_f[g, j], drive.load, tree.h)
 
 
 @wp.func

@@ -205,6 +205,21 @@ def test_ball_limit_holds():
     assert toward.min() > 0.9
 
 
+def test_joint_force_at_the_limit_of_a_ball():
+    """Along the link's axes there too: what is across the axis of the turn does h f / 0.12 in a step."""
+    rng = np.random.default_rng(3)
+    sim = Simulation(scenes.scene(ROTOR.format("ball", 'range="0 0.6"'), gravity="0 0 0"), 16)
+    axis, f = rng.standard_normal((2, 16, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    sim.reset(joint_q=[np.roll(quat_exp(0.65 * a), -1) for a in axis])  # 0.05 rad past it
+    sim.set_joint_force(f)
+    sim.step()
+    along = np.sum(sim.joint_qd * axis, axis=1, keepdims=True)
+    assert along.max() < -0.1  # the limit pushes back
+    across = f - axis * np.sum(f * axis, axis=1, keepdims=True)
+    np.testing.assert_allclose(sim.joint_qd - along * axis, H / 0.12 * across, atol=1e-5)
+
+
 def test_external_force():
     """F / m at the centre of mass, no turning, whatever the orientation; none in the other worlds."""
     body = '<body name="b" quat="0.5 0.5 0.5 -0.5"><freejoint/>'
