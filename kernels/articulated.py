@@ -17,7 +17,7 @@ are solved in these coordinates (see `contact`). `world.U` holds U D^(-1/2) and 
 
 import warp as wp
 
-from .drive import Push, judge, pd, spring, stop
+from .drive import Push, bound, damp, judge, load_along, pd, spring, stop
 from .kinematics import load3, load4, store3
 from .spatial import *
 from .tree import BALL, FREE, GROUND, HINGE, Tree, World
@@ -78,11 +78,10 @@ def free_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     R = world.R[g, i]
     v = load3(world.qd, g, j)
     w = load3(world.qd, g, j + 3)
-    none = fill(0.0)  # it has no effort limit
     away = logarithm(conjugate(load4(world.q, g, iq + 3)) * load4(world.target, g, iq + 3))
-    spin = pd(tree, j + 3, fill(tree.dof_kp[j + 3]) * away, w, none, zero3())
+    spin = damp(tree, j + 3, pd(tree, j + 3, fill(tree.dof_kp[j + 3]) * away, w), w)
     away = load3(world.target, g, iq) - load3(world.q, g, iq)
-    push = pd(tree, j, fill(tree.dof_kp[j]) * away, v, none, zero3())
+    push = damp(tree, j, pd(tree, j, fill(tree.dof_kp[j]) * away, v), v)
     f = spin.force + load3(world.joint_f, g, j + 3)
     b = take_out_turn(world, g, j + 5, b, column(R, 2), w.z, f.z, spin.load, h)
     b = take_out_turn(world, g, j + 4, b, column(R, 1), w.y, f.y, spin.load, h)
@@ -111,33 +110,53 @@ def ball_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     v = load3(world.qd, g, j)
     pull = fill(tree.dof_kp[j]) * logarithm(conjugate(q) * load4(world.target, g, iq))
     world.pull[g, i] = pull
-    drive = pd(tree, j, pull, v, world.full[g, i], world.torque[g, i])
+    servo = pd(tree, j, pull, v)
+    drive = servo
+    zero = fill(0.0)
+    half = fill(0.5)
+    n = zero3()
+    full = world.full[g, i]
+    if any_lt(half, full):
+        asked = world.asked[g, i]
+        drive = bound(servo, tree.link_effort[i], full, asked)
+        n = where_lt(half, full, (1.0 / max(norm(asked), fill(1.0e-20))) * asked, n)
+    dropped = servo.load - drive.load
+    drive = damp(tree, j, drive, v)
     if tree.link_sprung[i] != 0:
         drive = spring(tree, j, drive, logarithm(conjugate(q) * sprung(tree, iq)), v)
-    # Any three orthogonal axes will do for a ball joint's motion: the link's own, or, at the limit,
-    # the axis it has turned about and two more.
-    sx = column(R, 0)
-    sy = column(R, 1)
-    sz = column(R, 2)
-    halt = Push(fill(0.0), fill(0.0))
+    halt = Push(zero, zero)
     if tree.link_limited[i] != 0:
         if any_lt(abs(q.w), fill(tree.link_near[i])):
             turned = logarithm(q)
             angle = norm(turned)
-            axes = frame((1.0 / max(angle, fill(1.0e-6))) * turned)
-            n = row(axes, 0)
-            s = R * n
-            halt = stop(tree, tree.link_upper[i] - angle, dot(n, v), dot(s, b.I.A * s) + drive.load)
-            zero = fill(0.0)
-            sx = where_lt(zero, halt.load, s, sx)
-            sy = where_lt(zero, halt.load, R * row(axes, 1), sy)
-            sz = where_lt(zero, halt.load, R * row(axes, 2), sz)
+            axis = (1.0 / max(angle, fill(1.0e-6))) * turned
+            s = R * axis
+            weight = dot(s, b.I.A * s) + drive.load + dropped
+            halt = stop(tree, tree.link_upper[i] - angle, dot(axis, v), weight)
+            n = where_lt(zero, halt.load, axis, n)
+    # Any three orthogonal axes will do for a ball joint's motion: the link's own, or n and two more. n is, at
+    # the joint's limit, the axis it has turned about, else, at the drive's limit, its torque's. At both, what
+    # the drive couples of the three is left to the velocity at the step's start.
+    sx = column(R, 0)
+    sy = column(R, 1)
+    sz = column(R, 2)
+    kx = drive.load
+    ky = drive.load
+    kz = drive.load
+    own = dot(n, n)
+    if any_lt(half, own):
+        axes = frame(n)
+        sx = where_lt(half, own, R * row(axes, 0), sx)
+        sy = where_lt(half, own, R * row(axes, 1), sy)
+        sz = where_lt(half, own, R * row(axes, 2), sz)
+        kx = load_along(drive, row(axes, 0)) + halt.load
+        ky = load_along(drive, row(axes, 1))
+        kz = load_along(drive, row(axes, 2))
     w = R * v
     f = R * (drive.force + load3(world.joint_f, g, j))  # along the link's axes, whatever those of the motion
-    k = drive.load
-    b = take_out_turn(world, g, j + 2, b, sz, dot(sz, w), dot(sz, f), k, h)
-    b = take_out_turn(world, g, j + 1, b, sy, dot(sy, w), dot(sy, f), k, h)
-    b = take_out_turn(world, g, j, b, sx, dot(sx, w), dot(sx, f) + halt.force, k + halt.load, h)
+    b = take_out_turn(world, g, j + 2, b, sz, dot(sz, w), dot(sz, f), kz, h)
+    b = take_out_turn(world, g, j + 1, b, sy, dot(sy, w), dot(sy, f), ky, h)
+    b = take_out_turn(world, g, j, b, sx, dot(sx, w), dot(sx, f) + halt.force, kx, h)
     return b
 
 
@@ -150,11 +169,14 @@ def hinge_joint(tree: Tree, world: World, g: int, i: int, b: Body) -> Body:
     s = rotate(world.R[g, i], tree.link_axis[i])
     pull = tree.dof_kp[j] * (world.target[g, iq] - q)
     world.pull[g, i] = Vec3(pull, fill(0.0), fill(0.0))
-    drive = pd(tree, j, pull, v, world.full[g, i], world.torque[g, i].x)
+    servo = pd(tree, j, pull, v)
+    drive = bound(servo, tree.link_effort[i], world.full[g, i], world.asked[g, i].x)
+    dropped = servo.load - drive.load
+    drive = damp(tree, j, drive, v)
     if tree.link_sprung[i] != 0:
         drive = spring(tree, j, drive, tree.q_spring[iq] - q, v)
     if tree.link_limited[i] != 0:
-        weight = dot(s, b.I.A * s) + drive.load
+        weight = dot(s, b.I.A * s) + drive.load + dropped
         upper = stop(tree, tree.link_upper[i] - q, v, weight)
         lower = stop(tree, q - tree.link_lower[i], neg(v), weight)
         drive = Push(drive.force + upper.force - lower.force, drive.load + upper.load + lower.load)
@@ -226,8 +248,8 @@ def velocities(tree: Tree, world: World, g: int):
 
 
 @wp.func
-def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
-    """Root to leaves: the velocities that w stands for, and by them, but for trial 0, which drives are at
+def judge_drives(tree: Tree, world: World, g: int, judged: bool) -> bool:
+    """Root to leaves: the velocities that w stands for, and by them, where `judged`, which drives are at
     their limit. Whether any drive of any lane has changed. Uses p, which `factorize` has consumed, for V."""
     changed = fill(0.0)
     for i in range(1, tree.link_count + 1):
@@ -238,9 +260,9 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
         if joint == HINGE:
             v = rate(world, g, j, V)
             V.w = V.w + v * world.s[g, j]
-            if trial > 0 and tree.link_driven[i] != 0:
+            if judged and tree.link_driven[i] != 0:
                 end = Vec3(v, fill(0.0), fill(0.0))
-                changed = changed + judge(tree, world, g, i, end, trial)
+                changed = changed + judge(tree, world, g, i, end)
         else:
             if joint == FREE:
                 for k in range(3):
@@ -251,8 +273,8 @@ def judge_drives(tree: Tree, world: World, g: int, trial: int) -> bool:
             for k in range(3):
                 v = rate(world, g, j + k, V)
                 V.w = V.w + v * world.s[g, j + k]
-            if trial > 0 and tree.link_driven[i] != 0:
+            if judged and tree.link_driven[i] != 0:
                 end = mul_t(world.R[g, i], V.w - before)
-                changed = changed + judge(tree, world, g, i, end, trial)
+                changed = changed + judge(tree, world, g, i, end)
         world.p[g, i] = Force(V.w, V.v)
     return any_lt(fill(0.5), changed)

@@ -4,10 +4,13 @@ A drive pulls with kp (target - q - h v+) - kd v+, v+ being the velocity at the 
 Liu and Turk 2011). What multiplies v+ goes on the diagonal of the mass matrix, so the same matrix
 answers for drives and contacts.
 
-A drive whose torque would exceed its effort limit pushes with just that limit, and what it had on the
-diagonal is dropped. Whether it would is judged by the end of the step, contacts apart, and the step's
-velocities are found anew with it at its limit: a finger, or the pelvis between two hips and a back, is
-too light to be judged by the torque at the start, and would be thrown from one limit to the other.
+The torque that a drive gives is the nearest to that within its effort limit L: on a ball joint, L times its
+direction. Both are meant at the end of the step, contacts apart, so torques and velocities are found
+together, by Newton's method. A drive that would end the step with a, and |a| > L, is put at its limit and
+taken for L n + L / |a| (1 - n n^T) (what it asks for), n = a / |a|; velocities are found anew, until no drive
+changes. So along its torque a drive at its limit is dropped from the mass matrix, and across it a softer one
+stays: a torque whose direction were the last trial's would throw a light link from side to side. All torques
+are the one minimum of a convex function, so the search may start where the last step's has ended.
 """
 
 import warp as wp
@@ -20,9 +23,11 @@ from .tree import Tree, World
 LIMIT_WEIGHT = wp.constant(50.0)
 LIMIT_ERP = wp.constant(0.2)
 
-
-LAST_TRIAL = wp.constant(3)
-"""After this many trials a drive may only come off its limit."""
+TRIALS = wp.constant(5)
+"""Times that the velocities of a step are found, at most."""
+SAME_WAY = wp.constant(0.99995)
+"""Cosine of the angle, 0.01 rad, by which what a drive asks for may have turned since it was last looked at;
+its torque is then right within 5e-5 in length."""
 
 
 @wp.struct
@@ -33,6 +38,8 @@ class Drive:
     """at the velocity of the step's start [N m]"""
     load: Real
     """what the diagonal of the mass matrix gains for each axis [kg m^2]"""
+    spared: Vec3
+    """along the torque of a drive at its limit, else zero: an axis s gains (s . spared)^2 less"""
 
 
 @wp.struct
@@ -44,34 +51,67 @@ class Push:
 
 
 @wp.func
-def pd(tree: Tree, k: int, pull: Vec3, v: Vec3, full: Real, torque: Vec3) -> Drive:
-    """Drive, armature and damping of three dofs from k on: `pull` is kp (target - q), `v` their velocity;
-    in the lanes where `full` is 1 the drive is at its limit and gives `torque`."""
-    h = tree.h
-    b = tree.dof_kd[k] + h * tree.dof_kp[k]
-    damping = tree.dof_damping[k]
-    half = fill(0.5)
-    f = where_lt(half, full, torque, pull - fill(b) * v)
-    load = where_lt(half, full, fill(0.0), fill(h * b))
-    return Drive(f - fill(damping) * v, load + (tree.dof_armature[k] + h * damping))
+def pd(tree: Tree, k: int, pull: Vec3, v: Vec3) -> Drive:
+    """Drive of three dofs from k on: `pull` is kp (target - q), `v` their velocity."""
+    b = tree.dof_kd[k] + tree.h * tree.dof_kp[k]
+    return Drive(pull - fill(b) * v, fill(tree.h * b), zero3())
 
 
 @wp.func
-def pd(tree: Tree, k: int, pull: Real, v: Real, full: Real, torque: Real) -> Push:
+def pd(tree: Tree, k: int, pull: Real, v: Real) -> Push:
     """The same for one dof."""
-    h = tree.h
-    b = tree.dof_kd[k] + h * tree.dof_kp[k]
-    damping = tree.dof_damping[k]
-    half = fill(0.5)
-    f = where_lt(half, full, torque, pull - b * v)
-    load = where_lt(half, full, fill(0.0), fill(h * b))
-    return Push(f - damping * v, load + (tree.dof_armature[k] + h * damping))
+    b = tree.dof_kd[k] + tree.h * tree.dof_kp[k]
+    return Push(pull - b * v, fill(tree.h * b))
 
 
 @wp.func
-def judge(tree: Tree, world: World, g: int, i: int, v: Vec3, trial: int) -> Real:
-    """Put the drive of link i at its limit, or take it off, by the torque that it would end the step
-    with, v being the joint's velocity then; returns 1 where that is a change, else 0."""
+def bound(d: Drive, limit: float, full: Real, asked: Vec3) -> Drive:
+    """d, at its limit in the lanes where `full` is 1, linear about what it `asked` for."""
+    half = fill(0.5)
+    per = 1.0 / max(norm(asked), fill(1.0e-20))
+    n = per * asked
+    share = limit * per
+    load = share * d.load
+    force = fill(limit) * n + share * (d.force - dot(n, d.force) * n)
+    return Drive(
+        where_lt(half, full, force, d.force),
+        where_lt(half, full, load, d.load),
+        where_lt(half, full, sqrt(load) * n, zero3()),
+    )
+
+
+@wp.func
+def bound(d: Push, limit: float, full: Real, asked: Real) -> Push:
+    half = fill(0.5)
+    zero = fill(0.0)
+    force = where_lt(asked, zero, fill(-limit), fill(limit))
+    return Push(where_lt(half, full, force, d.force), where_lt(half, full, zero, d.load))
+
+
+@wp.func
+def damp(tree: Tree, k: int, d: Drive, v: Vec3) -> Drive:
+    """d with the joint's damping and armature."""
+    c = tree.dof_damping[k]
+    return Drive(d.force - fill(c) * v, d.load + (tree.dof_armature[k] + tree.h * c), d.spared)
+
+
+@wp.func
+def damp(tree: Tree, k: int, d: Push, v: Real) -> Push:
+    c = tree.dof_damping[k]
+    return Push(d.force - c * v, d.load + (tree.dof_armature[k] + tree.h * c))
+
+
+@wp.func
+def load_along(d: Drive, s: Vec3) -> Real:
+    """What the diagonal of the mass matrix gains for the axis s, link axes."""
+    c = dot(s, d.spared)
+    return d.load - c * c
+
+
+@wp.func
+def judge(tree: Tree, world: World, g: int, i: int, v: Vec3) -> Real:
+    """Put the drive of link i at its limit, or take it off, by what it asks for at the end of the step, v
+    being the joint's velocity then; returns 1 where that is a change or it asks another way, else 0."""
     k = tree.link_dof[i]
     b = tree.dof_kd[k] + tree.h * tree.dof_kp[k]
     limit = fill(tree.link_effort[i])
@@ -81,16 +121,19 @@ def judge(tree: Tree, world: World, g: int, i: int, v: Vec3, trial: int) -> Real
     end = world.pull[g, i] - fill(b) * v
     length = norm(end)
     was = world.full[g, i]
-    # at the limit a drive stays while it would still pull the same way, and more
-    stays = where_lt(zero, dot(end, world.torque[g, i]), one, zero)
-    now = where_lt(limit, length, where_lt(half, was, stays, one), zero)
-    if trial == LAST_TRIAL:
-        now = min(now, was)
-    turns = where_lt(half, now, where_lt(was, half, one, zero), zero)
-    aim = (limit / max(length, fill(1.0e-20))) * end
-    world.torque[g, i] = where_lt(zero, turns, aim, world.torque[g, i])
-    world.full[g, i] = now
-    return abs(now - was)
+    changed = zero
+    if any_lt(half, was) or any_lt(limit, length):
+        before = world.asked[g, i]
+        along = dot(end, before)
+        # it stays at its limit while it asks for more the same way
+        stays = where_lt(zero, along, one, zero)
+        now = where_lt(limit, length, where_lt(half, was, stays, one), zero)
+        turned = where_lt(along, SAME_WAY * (length * norm(before)), now, zero)
+        changed = max(turned, abs(now - was))
+        # in lanes without a change velocities are to stay, so what was asked for has to
+        world.asked[g, i] = where_lt(half, min(now, changed), end, before)
+        world.full[g, i] = now
+    return changed
 
 
 @wp.func
@@ -98,7 +141,7 @@ def spring(tree: Tree, k: int, d: Drive, error: Vec3, v: Vec3) -> Drive:
     """d with the joint's passive spring added."""
     h = tree.h
     c = tree.dof_stiffness[k]
-    return Drive(d.force + fill(c) * error - fill(h * c) * v, d.load + h * h * c)
+    return Drive(d.force + fill(c) * error - fill(h * c) * v, d.load + h * h * c, d.spared)
 
 
 @wp.func
@@ -111,7 +154,8 @@ def spring(tree: Tree, k: int, d: Push, error: Real, v: Real) -> Push:
 @wp.func
 def stop(tree: Tree, room: Real, v: Real, weight: Real) -> Push:
     """Push against a limit `room` away (negative: past it) that is approached with `v`; `weight` is
-    the joint's articulated inertia. Nothing where the limit is not reached within the step."""
+    the joint's articulated inertia, its drive in full: one that depended on whether the drive is at its
+    limit would decide that, and come to no end. Nothing where the limit is not reached within the step."""
     h = tree.h
     load = LIMIT_WEIGHT * weight
     past = min(room, fill(0.0))

@@ -58,6 +58,6 @@ def even_out(tree: Tree, world: World, g: int):
         if average(tree, world, g):
             inertias(tree, world, g, world.mean)
             factorize(tree, world, g)
-            judge_drives(tree, world, g, 0)
+            judge_drives(tree, world, g, False)
         else:
             count = MOST

@@ -8,7 +8,7 @@ import warp as wp
 from .aim import Course, aim
 from .articulated import factorize, judge_drives, velocities
 from .contact import HEAD, drop_impulses, find  # noqa: F401
-from .drive import LAST_TRIAL
+from .drive import TRIALS
 from .integrate import integrate
 from .kinematics import inertias, kinematics
 from .settle import residual
@@ -37,12 +37,12 @@ def start(tree: Tree, world: World, g: int):
     """From the state to w, the velocity that all but contacts lead to."""
     kinematics(tree, world, g)
     trial = int(0)
-    while trial < LAST_TRIAL:
+    while trial < TRIALS:
         trial = trial + 1
         inertias(tree, world, g, world.V)
         factorize(tree, world, g)
-        if not judge_drives(tree, world, g, trial):
-            trial = LAST_TRIAL
+        if not judge_drives(tree, world, g, True):
+            trial = TRIALS
 
 
 @wp.func
@@ -100,7 +100,7 @@ def run_factorize(tree: Tree, world: World, first: int, count: int):
 def run_judge_drives(tree: Tree, world: World, first: int, count: int):
     g = first + wp.tid()
     for _k in range(count):
-        judge_drives(tree, world, g, 1)
+        judge_drives(tree, world, g, True)
 
 
 @wp.kernel

@@ -182,8 +182,8 @@ class World:
 
     pull: wp.array2d(dtype=Vec3)
     """kp (target - q) of each link's drive [N m]"""
-    torque: wp.array2d(dtype=Vec3)
-    """of a drive at its limit, link axes [N m]"""
+    asked: wp.array2d(dtype=Vec3)
+    """what a drive at its limit would give without one, link axes [N m]"""
     full: wp.array2d(dtype=Real)
     """1: the link's drive is at its limit"""
 
@@ -234,7 +234,7 @@ class World:
 COLUMNS = {
     "q": "q target",
     "dof": "qd joint_f s U d w w_settled",
-    "link": "mass_scale turn R pos r V A I p pull torque full touched struck",
+    "link": "mass_scale turn R pos r V A I p pull asked full touched struck",
     "flight": "knock",
     "loose": "mean",
     "tumbler": "lag",
@@ -247,7 +247,7 @@ COLUMNS = {
 }
 """What the columns of a `World`'s arrays are: a joint coordinate each, a degree of freedom, ..."""
 CARRIED = (
-    *("q", "qd", "impulse", "knock", "full", "torque"),
+    *("q", "qd", "impulse", "knock", "full", "asked"),
     *("broken", "fallen", "fumbled", "hurried", "strayed"),
 )
 """Arrays that a step hands to the next."""

@@ -18,7 +18,7 @@ QUANTITIES = {
     "impulse": "impulse",
     "knock": "knock",
     "full": "full",
-    "torque": "torque",
+    "torque": "asked",
     "broken": "broken",
     "fallen": "fallen",
     "fumbled": "fumbled",

@@ -4,7 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.reference import scenes
 from tests.reference.rigid import Rigid, from_mujoco, random_state, same_signs, to_mujoco
+from tests.reference.trees import text
 from warpdribble.sims import Model, Simulation
 
 WORLDS = 16
@@ -110,6 +112,57 @@ def test_effort_limits():
         assert 0.02 <= full.mean() <= 0.5
         assert (~good).mean() <= 0.02
         q, v = to_mujoco(robot.m, sim.joint_q), after
+
+
+def chain(rng, length):
+    """Of ball joints, with gains from soft to stiff and effort limits that most of them meet."""
+    inside, servos = "", []
+    for j in range(length):
+        place, com = rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.15, 0.15, 3)
+        a, b, c = rng.uniform(0.002, 0.02, 3)
+        inside = (
+            f'<body pos="{text(place)}"><joint name="j{j}" type="ball" armature="0.001"/>'
+            f'<inertial pos="{text(com)}" mass="{rng.uniform(0.3, 3):.6g}"'
+            f' diaginertia="{text([a + b, b + c, a + c])}"/>{inside}</body>'
+        )
+        kp, kv = rng.uniform(20, 400), rng.uniform(0.5, 15)
+        limit = kp * rng.uniform(0.05, 1)
+        servos += [
+            f'<position joint="j{j}" gear="{gear}" kp="{kp:.6g}" kv="{kv:.6g}"'
+            f' forcerange="{text([-limit, limit])}"/>'
+            for gear in ("1 0 0", "0 1 0", "0 0 1")
+        ]
+    return (
+        f'<mujoco><option timestep="0.01"/><worldbody>{inside}</worldbody>'
+        f"<actuator>{''.join(servos)}</actuator></mujoco>"
+    )
+
+
+def test_effort_limits_of_flung_chains():
+    """Every torque at a limit points the way that is asked for, at each of 16 steps with targets that jump:
+    velocities beside the exact solution's, relative to the fastest of a world's and 1 rad/s."""
+    rng, off, full = np.random.default_rng(0), [], []
+    for length in (2, 3, 4, 5):
+        xml = chain(rng, length)
+        robot, h = Rigid(mujoco.MjModel.from_xml_string(xml)), 0.01
+        sim, drives = Simulation(scenes.model(xml), WORLDS), robot.drives()
+        q, v = random_state(robot.m, rng, WORLDS, spread=1.0)
+        sim.reset(joint_q=from_mujoco(robot.m, q), joint_qd=10 * v / np.abs(v).max())
+        for k in range(16):
+            if k % 8 == 0:
+                target, _ = random_state(robot.m, rng, WORLDS, spread=1.5)
+                sim.set_targets(from_mujoco(robot.m, target))
+            q, v = to_mujoco(robot.m, sim.joint_q), sim.joint_qd.astype(float)
+            sim.step()
+            after = sim.joint_qd.astype(float)
+            for w in np.flatnonzero(np.abs(after).max(axis=1) < 57):  # no joint at max_speed
+                exact = robot.within_effort(q[w], v[w], target[w], h, drives)
+                off.append(np.abs(after[w] - exact).max() / (1 + np.abs(exact).max()))
+                full += [*robot.obeys_effort_limits(q[w], v[w], exact, target[w], h, drives)[1]]
+    share = np.quantile(off, [0.5, 0.9, 0.99, 1])
+    print(f"{100 * np.mean(full):.0f} % of drives at their limit, velocities off by {share}")
+    assert len(off) > 600 and np.mean(full) > 0.3
+    assert (share <= [1e-5, 1e-3, 1e-2, 0.1]).all()
 
 
 def test_quaternions_stay_unit():

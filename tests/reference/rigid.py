@@ -308,7 +308,7 @@ class Rigid:
     def obeys_effort_limits(self, q, v, after, target, h, drives, joint_f=0.0, force=None):
         """Per driven joint, whether a step kept the drives' law: the torque is what the drive's gains
         ask for at the end of the step, within the limit; or it is at the limit, where the gains ask
-        for more, the same way. Returns that, and whether it is at the limit."""
+        for more, the same way to 0.01 rad. Returns that, and whether it is at the limit."""
         torque, error = self.exerted(q, v, after, h, joint_f, force)
         asked = self.pull(q, after, target, h, drives)
         good, full = [], []
@@ -320,11 +320,36 @@ class Rigid:
             tolerance += 1e-4 * min(limit, np.linalg.norm(asked[J]))
             length = np.linalg.norm(torque[J])
             free = np.abs(torque[J] - asked[J]).max() <= tolerance and length <= limit + tolerance
-            at_limit = abs(length - limit) <= tolerance and torque[J] @ asked[J] > 0
-            at_limit = at_limit and np.linalg.norm(asked[J]) >= limit - tolerance
+            size = np.linalg.norm(asked[J])
+            aside = np.linalg.norm(torque[J] - length / max(size, 1e-300) * asked[J])
+            at_limit = abs(length - limit) <= tolerance and aside <= tolerance + 0.01 * limit
+            at_limit = at_limit and size >= limit - tolerance
             good.append(free or at_limit)
             full.append(at_limit and not free)
         return np.array(good, bool), np.array(full, bool)
+
+    def within_effort(self, q, v, target, h, drives):
+        """v+ of the implicit step in which every drive gives what it asks for, cut to its limit's length.
+
+        With b = h kp + kd and G = h M^-1, the torques t minimise t (G + 1 / b) t / 2 - t pull / b, pull being
+        what is asked for at the velocity without drives, over the balls |t_joint| <= limit: accelerated
+        projected gradients, in units of b^(1/2)."""
+        f, M = self.passive(q, v, h)
+        G, b = h * np.linalg.inv(M), drives.kd + h * drives.kp
+        unit = np.sqrt(b)
+        A = np.eye(self.m.nv) + unit[:, None] * G * unit
+        pull = self.pull(q, v + G @ f, target, h, drives) / np.where(b > 0, unit, 1)
+        most = np.linalg.eigvalsh(A)[-1]
+        lead = (np.sqrt(most) - 1) / (np.sqrt(most) + 1)
+        t, ahead, change = np.zeros(self.m.nv), np.zeros(self.m.nv), np.inf
+        while change > 1e-11 * np.abs(pull).max():
+            new = ahead + (pull - A @ ahead) / most
+            for link in self.links:
+                if link.kind in (BALL, HINGE):
+                    size = np.linalg.norm(unit[link.dofs] * new[link.dofs])
+                    new[link.dofs] *= min(1, drives.effort[link.joint] / max(size, 1e-300))
+            t, ahead, change = new, new + lead * (new - t), np.abs(new - t).max()
+        return v + G @ (f + unit * t)
 
     def step(self, q, v, target, h, drives, joint_f=0.0, force=None):
         """q+, v+ of one step without contacts, joint limits and effort limits."""
