@@ -151,19 +151,24 @@ def toes(case: Case) -> float | None:
     return float(np.degrees(np.quantile(np.concatenate(errors), 0.95))) if errors else None
 
 
+def shake(speeds: np.ndarray, rate: float) -> float:
+    """Root mean square of the acceleration between 5 and 30 Hz of speeds (n, frames) at `rate` [Hz]."""
+    band = butter(2, SHAKE, btype="band", fs=rate, output="sos")
+    faster = np.gradient(speeds, axis=1) * rate
+    return float(np.sqrt(np.mean(sosfiltfilt(band, faster, axis=1)[:, ENDS:-ENDS] ** 2)))
+
+
 def knees(case: Case) -> float | None:
     """[-] root mean square of the knees' acceleration between 5 and 30 Hz over the copied rotations'."""
     rate = 1.0 / case.model.timestep
     if len(case.body_q) < 40:
         return None
-    band = butter(2, SHAKE, btype="band", fs=rate, output="sos")
 
-    def shake(copied: bool) -> float:
+    def accelerates(copied: bool) -> float:
         angles = np.stack([case.angle(knee, copied) for knee in case.result.mapping.legs])
-        faster = np.gradient(np.gradient(angles, axis=1), axis=1) * rate**2
-        return float(np.sqrt(np.mean(sosfiltfilt(band, faster, axis=1)[:, ENDS:-ENDS] ** 2)))
+        return shake(rate * np.gradient(angles, axis=1), rate)
 
-    return shake(False) / max(shake(True), 1e-9)
+    return accelerates(False) / max(accelerates(True), 1e-9)
 
 
 def hands(case: Case) -> float:
