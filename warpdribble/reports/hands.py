@@ -348,9 +348,11 @@ def draw(rows: Rows, skill: str, out: Path) -> None:
             ax.plot(medians, "-", lw=1, color="0.5", zorder=0)
             ax.set_xticks(range(len(values)), [said(name, v).removeprefix("x ") for v in values])
             ax.set_xlim(-0.5, len(values) - 0.5)
-            ax.set_ylim(0.0)
             ax.tick_params(labelsize=8)
             ax.grid(alpha=0.3)
+    for line, measure in zip(axes, measures):
+        known = [row[measure] for row in rows if row["skill"] == skill]
+        line[0].set_ylim(0.0, 1.08 * np.nanmax(known))
     for ax, name in zip(axes[0], SWEEP):
         ax.set_title(SAID[name][0].replace(" [", "\n["), fontsize=9)
     save(figure, "Each changed alone; blue: as the player's file has it", out)
