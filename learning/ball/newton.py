@@ -28,6 +28,8 @@ LANES = 8
 """Batches are made of whole vectors of worlds."""
 STARTS = 4
 """from which a window is begun, the best of which counts"""
+POOR = 2
+"""cycles in which a window that is not fair is found in other ways, too"""
 TINY = 1e-6
 """[m]"""
 WORST = 1.0e3
@@ -66,6 +68,8 @@ class NewtonConfig:
     """A window is done at this multiple of the least cost that it ever had."""
     good: float = 0.05
     """or at this cost"""
+    fair: float = 0.3
+    """A first window that costs more is begun in other ways, too."""
     steps: int = 40
     """of a descent, at most"""
     part: int = 4
@@ -135,6 +139,9 @@ class Newton(Cycles):
         at = self._best(self.tasks[0], k, starts[:, self.active[k]])
         enough = self.config.good if first else max(self.config.good, self.config.enough * self.least[number])
         at, slope = self._descend(k, at, self.slopes.get(number), enough)
+        if at.keeps and at.cost > self.config.fair and self.iteration < POOR * len(self.windows):
+            other = self._by_parts(k, np.zeros_like(starts[0]))
+            at, slope = min((at, slope), other, key=lambda one: one[0].rank)
         for room in (self.config.room, np.inf):  # what keeps clear may also keep from getting there
             if not at.keeps:
                 self.room = room

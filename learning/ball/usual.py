@@ -16,10 +16,13 @@ from .smc import Smc
 LOOSE = 3.0
 """[cm] Fingers farther from the ball than this, over the first cycle, do not have it."""
 
+SOME = 20
+"""cycles that are worth keeping, though they end"""
+
 
 class Usual:
-    """Learns as `newton` does; once its first cycle is not found, or is loose, as the walk that `then` makes,
-    from the beginning."""
+    """Learns as `newton` does; once its first cycle is loose, or no step leads on before there are SOME, as
+    the walk that `then` makes, from the beginning."""
 
     def __init__(self, newton: Newton, then: Callable[[], Smc]):
         self.then, self.before, self.iteration = then, 0, 0
@@ -37,7 +40,8 @@ class Usual:
         now, report = self.now, self.now.iterate()
         self.fingers.append(report.fingers)
         first = len(self.fingers) == len(now.windows)
-        if (now.stuck and not now.found) or (first and not float(np.mean(self.fingers)) <= LOOSE):
+        lost = now.stuck and len(self.fingers) <= SOME * len(now.windows)
+        if lost or (first and not float(np.mean(self.fingers)) <= LOOSE):
             self.before, self.now = len(self.fingers), self.then()
             report = replace(report, iteration=self.before, fresh=False)
         self.iteration = report.iteration

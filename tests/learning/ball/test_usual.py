@@ -7,7 +7,7 @@ import pytest
 
 from warpdribble.learning.ball.cycles import Window
 from warpdribble.learning.ball.smc import Smc
-from warpdribble.learning.ball.usual import LOOSE, Usual
+from warpdribble.learning.ball.usual import LOOSE, SOME, Usual
 
 
 class Steps:
@@ -75,7 +75,7 @@ def test_steps_that_hold_the_ball_go_on():
     assert isinstance(learner.now, Steps) and [r.iteration for r in reports] == [1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("fingers", [[1.0, 2 * LOOSE, 1.0], [np.nan]])
+@pytest.mark.parametrize("fingers", [[1.0, 2 * LOOSE, 1.0], [np.nan], [1.0, 1.0, np.nan]])
 def test_steps_that_do_not_give_way_to_the_walk(fingers):
     learner, reports = learned(fingers)
     assert isinstance(learner.now, Walk)
@@ -84,7 +84,7 @@ def test_steps_that_do_not_give_way_to_the_walk(fingers):
 
 
 def test_what_was_found_before_is_kept_by_steps_that_get_stuck():
-    learner, reports = learned([1.0, 1.0, np.nan])
+    learner, reports = learned([1.0] * 2 * SOME + [np.nan])
     assert isinstance(learner.now, Steps) and reports[-1].found == 0
 
 
