@@ -147,12 +147,8 @@ class Cycles:
 
     @property
     def result(self) -> Arrays | None:
-        """All that was found, as of `Optimised`, and its first state to start from; None before the first."""
-        if not self.found:
-            return None
-        found = Optimised.joined(self.found)
-        first = {"k": found.k[:1], "joint_q": found.joint_q[:1], "joint_qd": found.joint_qd[:1]}
-        return found.arrays | {f"states.{name}": value for name, value in first.items()}
+        """All that was found; None before the first."""
+        return Optimised.joined(self.found).result if self.found else None
 
     @property
     def state(self) -> Arrays:

@@ -44,6 +44,14 @@ class Optimised:
         """By name, for a file."""
         return dict(vars(self))
 
+    @property
+    def result(self) -> Arrays | None:
+        """Of a stage: the arrays, and the state that it starts from; None where nothing was found."""
+        if not len(self):
+            return None
+        first = {f"states.{name}": getattr(self, name)[:1] for name in ("k", "joint_q", "joint_qd")}
+        return self.arrays | first
+
     @staticmethod
     def of(arrays: Arrays) -> Optimised:
         return Optimised(*(np.asarray(arrays[f.name]) for f in fields(Optimised)))

@@ -257,15 +257,8 @@ class Smc:
 
     @property
     def result(self) -> Arrays | None:
-        """The trajectory, and the state that it starts from; None before the first whole cycle."""
-        if not self.found_cycles:
-            return None
-        first = {
-            "k": self.found.k[:1],
-            "joint_q": self.found.joint_q[:1],
-            "joint_qd": self.found.joint_qd[:1],
-        }
-        return self.found.arrays | {f"states.{name}": value for name, value in first.items()}
+        """The trajectory; None before the first whole cycle."""
+        return self.found.result if self.found_cycles else None
 
     @property
     def state(self) -> Arrays:

@@ -17,6 +17,7 @@ from ..ball.optimised import Optimised, Playback
 from ..ball.paper import Paper, PaperConfig, population
 from ..ball.smc import Smc, SmcConfig
 from ..ball.usual import Usual
+from ..ball.windows import holding
 from ..evaluate.attempts import ROOT_DRIVE
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
@@ -84,7 +85,7 @@ def ball_in_hand(model: Model, graph: ControlGraph) -> Starts:
     mark = int(graph.checkpoints[0]) if len(graph.checkpoints) else 0
     after = (np.arange(graph.count) * STEPS - mark - 1) % (graph.count * STEPS)
     k = int(np.argmin(np.where(began, after, np.inf)))
-    joint_q = in_hand(model, graph.start_q[k], graph.touch[k * STEPS - 1])
+    joint_q = in_hand(model, graph.start_q[k], holding(graph, k))
     return Starts(np.array([k]), joint_q[None], graph.start_qd[[k]])
 
 
