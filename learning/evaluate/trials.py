@@ -24,6 +24,8 @@ class Trials:
 
     survived: np.ndarray
     """(trials,) bool"""
+    fell: np.ndarray
+    """(trials,) bool: ended as the player fell; who neither survived nor fell has lost the ball"""
     lived: np.ndarray
     """(trials,) share of the time before its fall"""
     cost: float
@@ -62,8 +64,10 @@ def run_trials(
     rollout = Rollout(task, controller, RandomWalk(streams), start, Disturber(disturbance, streams))
     fragments = max(1, round(cycles * task.graph.cycle))
     stands, life, cost = np.ones(task.worlds, bool), np.zeros(task.worlds), 0.0
+    fell = np.zeros(task.worlds, bool)
     errors = Errors(task, start)
     for fragment in rollout.fragments(fragments):
+        fell |= stands & fragment.failed & task.fallen
         stands &= ~fragment.failed
         if not stands.any():
             break
@@ -74,7 +78,7 @@ def run_trials(
             progress(fragment.row + 1)
     task.calm()
     mean = float(cost / life.sum()) if life.any() else np.nan
-    return Trials(stands, life / fragments, mean, *errors.means(), errors.astray(stands))
+    return Trials(stands, fell, life / fragments, mean, *errors.means(), errors.astray(stands))
 
 
 def record_starts(

@@ -31,9 +31,12 @@ HELD = 0.05
 UNITS = {"POINT": 0.05, "VELOCITY": 0.3, "BETWEEN": 0.05, "BALLISTIC": 0.05, "COM": 0.05, "COM_VELOCITY": 0.3,
          "ANGULAR_MOMENTUM": 3.0}  # fmt: skip
 """[m, m/s, s, kg m^2/s] Deviations that count as one in the state, by kind of observation."""
-STATES = ("reduced", "ballistic", "paper", "tips")
-"""What a policy may feel: ball, hands and what the legs feel; with the ball's flight, too; the 165 numbers of
-Eq. 9; the way from the ball to thumbs, index and little fingers, 18 numbers (P1 7.1, skill A)."""
+JOINT_SPEED, MOVE = 3.0, 0.1
+"""[rad/s], [rad] that count as one: of the arms' joints, of the offsets of the fragment before."""
+STATES = ("reduced", "ballistic", "full", "paper", "tips")
+"""What a policy may feel: ball, hands and what the legs feel; with the ball's flight, too; with the arms'
+joint speeds and the last action as well; the 165 numbers of Eq. 9; the way from the ball to thumbs, index and
+little fingers, 18 numbers (P1 7.1, skill A)."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ class Arms(Locomotion):
             **{f"to {tip}": terms.between(ball, tip) for tip in tips},
         }
         felt = ["ball", "ball velocity", *hands, *(f"{hand} velocity" for hand in hands)]
-        if state == "ballistic":
+        if state in ("ballistic", "full"):
             felt.append("flight")
         elif state == "tips":
             felt = [f"to {tip}" for tip in tips if tip.split("_")[1] in SIGNALS]
@@ -121,8 +124,11 @@ class Arms(Locomotion):
         kinds = self.terms
         self._arms = np.concatenate([np.arange(self.probe.size)[self.columns[n]] for n in felt])
         self._units = np.concatenate([np.full(kinds[n].count, UNITS[kinds[n].kind]) for n in felt])
-        self._legs_too = state in ("reduced", "ballistic")
+        self._legs_too = state in ("reduced", "ballistic", "full")
+        self._speeds = _arm_dofs(model) if state == "full" else None
         self.obs = len(self._units) + self.legs_obs * self._legs_too
+        if self._speeds is not None:
+            self.obs += len(self._speeds) + self.actions
         touch = graph.touch.astype(float)
         mark = np.zeros_like(touch)
         mark[graph.checkpoints] = touch[graph.checkpoints]
@@ -167,7 +173,13 @@ class Arms(Locomotion):
     def observe(self, k: np.ndarray) -> np.ndarray:
         """State s (worlds, obs): how far what is felt is off the reference at the start of fragments k."""
         off = (self.felt[:, self._arms] - self.start[k][:, self._arms]) / self._units
-        return np.concatenate([off, super().observe(k)], axis=1) if self._legs_too else off
+        if not self._legs_too:
+            return off
+        parts = [off, super().observe(k)]
+        if self._speeds is not None:
+            speed = self.sim.joint_qd[:, self._speeds] - self.graph.start_qd[k][:, self._speeds]
+            parts += [speed / JOINT_SPEED, self._before / MOVE]
+        return np.concatenate(parts, axis=1)
 
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         if first == 0:
@@ -188,7 +200,7 @@ class Arms(Locomotion):
         w, columns = self._weights, self.columns
         _, failed = super().judge(k)
         if self.graph.tracked:  # nobody falls who is held
-            failed = self.felt[:, columns["status"]][:, 0].astype(int) & NONFINITE != 0
+            failed = self.fallen = self.felt[:, columns["status"]][:, 0].astype(int) & NONFINITE != 0
         assert self.watch is not None
         seen = self.watch.read()
         held = self.held[k]
@@ -203,7 +215,7 @@ class Arms(Locomotion):
             np.linalg.norm(off[:, columns[f"hand {h}"]], axis=1) for h in self.model.roles.both("hands")
         )
         bad = self.felt[:, columns["status"]][:, 0].astype(int) & BAD_CONTACT != 0
-        failed |= bad | self.missed | ~(ball < w.lost)
+        failed = failed | bad | self.missed | ~(ball < w.lost)
         cost = (
             w.fingers * np.nan_to_num(self.fingers / (1.0 + np.maximum(self.fingers, 0.0) / self.near))
             + w.ball * ball
@@ -235,6 +247,13 @@ RESTITUTION = 0.8
 
 def _forearms(model: Model) -> list[str]:
     return [model.body_names[model.joint_body(elbow)] for elbow in model.roles.both("elbows")]
+
+
+def _arm_dofs(model: Model) -> np.ndarray:
+    """Of both arms' joints, as the columns of their offsets."""
+    roles = model.roles
+    joints = [*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists")]
+    return np.concatenate([np.arange(model.nv)[model.dof_slice(joint)] for joint in joints])
 
 
 def _spread() -> np.ndarray:

@@ -122,6 +122,8 @@ class Locomotion(Follow):
         self.probe.want(self.goal)
         self.felt = np.zeros((worlds, self.probe.size), np.float32)
         """(worlds, n) what `probe` said last"""
+        self.fallen = np.zeros(worlds, bool)
+        """(worlds,) who failed in the last fragment by falling"""
         self._cost = np.zeros(worlds, np.float32)
 
     def _reference(self, joint_q: np.ndarray, joint_qd: np.ndarray) -> np.ndarray:
@@ -162,7 +164,7 @@ class Locomotion(Follow):
         lies on the ground or is about to, or has left it, flung by something absurd."""
         off = self.felt[:, self.columns["height"]][:, 0] - self.goal[k, self.columns["height"]][:, 0]
         down = self.felt[:, self.columns["status"]][:, 0].astype(int) & (FALL | NONFINITE) != 0
-        failed = down | ~(np.abs(off) < FALLEN)
+        failed = self.fallen = down | ~(np.abs(off) < FALLEN)
         cost = self._cost + self._heading * np.abs(self.astray)
         return np.where(failed, np.inf, cost), failed
 

@@ -24,6 +24,8 @@ class Evaluate:
     """The run, a folder that warpdribble learn wrote; or dribble-right-authored, which ships."""
     cycles: float = 200.0
     """Length of a trial."""
+    seconds: float | None = None
+    """The same in seconds, instead of cycles."""
     trials: int = 100
     """How many, each from a random state."""
     stage: str = ""
@@ -56,6 +58,8 @@ class Evaluate:
         from ..learning.tasks.follow import OpenLoop
 
         check_range("--cycles", self.cycles, 0.1, 1e5)
+        if self.seconds is not None:
+            check_range("--seconds", self.seconds, 0.05, 1e6)
         check_range("--trials", self.trials, 1, 2**16)
         check_range("--push", self.push, 0.0, 1e4)
         check_range("--arms", self.arms, 0.0, 10.0)
@@ -66,13 +70,15 @@ class Evaluate:
         find_device(self.device)
         with compiling():
             task = warmed(one.task(self.trials, self.device))
+        graph = task.graph
+        cycles = self.cycles if self.seconds is None else self.seconds / (graph.cycle * graph.period)
         controller = OpenLoop(task.actions) if self.open_loop else one.controller
-        with bar(f"{self.trials} trials", max(1, round(self.cycles * task.graph.cycle))) as progress:
+        with bar(f"{self.trials} trials", max(1, round(cycles * graph.cycle))) as progress:
             trials = run_trials(
                 task,
                 controller,
                 one.starts,
-                self.cycles,
+                cycles,
                 self.seed,
                 self.noise,
                 Disturbance(push=self.push, arms=self.arms, hands=self.hands),
@@ -85,17 +91,19 @@ class Evaluate:
             "iterations": one.iteration,
             "open_loop": self.open_loop,
             "trials": self.trials,
-            "cycles": self.cycles,
-            "seconds": self.cycles * task.graph.cycle * task.graph.period,
+            "cycles": cycles,
+            "seconds": cycles * graph.cycle * graph.period,
             "noise": self.noise,
             "push": self.push,
             "arms": self.arms,
             "hands": self.hands,
             "seed": self.seed,
             "survived": int(trials.survived.sum()),
+            "fell": int(trials.fell.sum()),
+            "lost": int(np.sum(~trials.survived & ~trials.fell)),
             "lived": float(trials.lived.mean()),
-            "cycles_lasted_median": self.cycles * float(np.median(trials.lived)),
-            "cycles_lasted_most": self.cycles * float(trials.lived.max()),
+            "cycles_lasted_median": cycles * float(np.median(trials.lived)),
+            "cycles_lasted_most": cycles * float(trials.lived.max()),
             "cost": trials.cost,
             "angle_error_deg": math.degrees(trials.angle_error),
             "end_error_cm": 100.0 * trials.end_error,
@@ -146,7 +154,8 @@ def _text(report: dict[str, Any]) -> list[str]:
         f"trials    {report['trials']} of {report['cycles']:g} cycles ({report['seconds']:.0f} s), "
         f"speed noise {report['noise']:g}, pushes up to {report['push']:g} N, "
         f"arms {report['arms']:g} rad, hands {report['hands']:g} N, seed {report['seed']}",
-        f"survived  {report['survived']} of {report['trials']}, "
+        f"survived  {report['survived']} of {report['trials']}, {report['fell']} fell, "
+        f"{report['lost']} lost the ball; "
         f"{100.0 * report['lived']:.1f} % of the time lived; the median lasted "
         f"{report['cycles_lasted_median']:.4g} cycles, the longest {report['cycles_lasted_most']:.4g}",
         f"tracking  joints {shown('angle_error_deg', 'degrees')}, "
