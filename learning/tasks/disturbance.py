@@ -3,6 +3,7 @@ as another policy likes."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -46,6 +47,15 @@ class Disturber:
         self.what, self.streams = what, streams
         self._left = np.zeros(streams.count, int)
         self._forces = np.zeros((streams.count, 3, 3))
+
+    @property
+    def state(self) -> dict[str, np.ndarray]:
+        """What goes on beyond a fragment, by name, for `restore`."""
+        return {"left": self._left.copy(), "forces": self._forces.copy()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from a `state`."""
+        self._left, self._forces = np.array(state["left"]), np.array(state["forces"])
 
     def apply(self, task: Follow) -> None:
         """Set the forces and the arms' offsets of the coming fragment."""

@@ -34,8 +34,8 @@ class Learn:
     """Of a clip: its ends are made to meet."""
     stage: str = ""
     """What to learn: locomotion, to stay up and follow the motion without the ball; ball, cycle after cycle
-    of arms and fingers that keep it; linear, a policy that does. When empty, all that the skill needs, in
-    this order."""
+    of arms and fingers that keep it; policy, a network that keeps it for good, or linear, the paper's simpler
+    policy. When empty, all that the skill needs: locomotion, and where there is a ball, ball and policy."""
     method: str = ""
     """How the stage ball finds its cycles: usual, newton, smc or paper (docs/dribbling.md)."""
     seed: int = 0
@@ -53,7 +53,7 @@ class Learn:
 
     def run(self) -> int:
         from ..learning import Run
-        from ..learning.methods import STAGES
+        from ..learning.methods import STAGES, needed
         from ..sims.errors import InputError
         from ..skills.graph import skill_fields, skill_text
 
@@ -81,7 +81,7 @@ class Learn:
             f"time stretched by {100.0 * (graph.stretch - 1.0):+.1f} %"
         )
         plays = graph.touch is not None and bool(graph.touch.any())
-        stages = [stage for stage in STAGES.values() if plays or not stage.ball]
+        stages = needed("policy" if plays else "locomotion")
         if graph.tracked:
             stages = [STAGES["ball"]]
         if self.stage:
@@ -182,13 +182,14 @@ class Learn:
             say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{share}")
             if "samples_per_second" in rows[-1]:
                 rate = sum(row["samples_per_second"] for row in rows) / len(rows)
-                outside = sum(row["outside"] for row in rows) / len(rows)
-                say(
-                    f"speed     {rate:.0f} samples/s, {100.0 * outside:.0f} % of the time "
-                    "outside the simulation"
-                )
+                mean = {key: sum(row[key] for row in rows) / len(rows) for key in BESIDE if key in rows[0]}
+                said = [f"{100.0 * share:.0f} % of the time {BESIDE[key]}" for key, share in mean.items()]
+                say(", ".join([f"speed     {rate:.0f} samples/s", *said]))
         if not trained.has_events:
             say("          no files for TensorBoard: pip install tensorboard, and the same again")
+
+
+BESIDE = {"outside": "outside the simulation", "learning": "learning beside the simulation"}
 
 
 class Shown:
@@ -208,6 +209,8 @@ class Shown:
                 f"{cycles} cycles",
                 f"fingers {getattr(report, 'fingers', math.nan):.1f} cm from the ball",
             ]
+        if math.isfinite(lost := getattr(report, "lost", math.nan)) and hasattr(report, "reward"):
+            parts += [f"{lost:.1f} of 1000 fragments lost the ball"]
         text = ", ".join([*parts, f"cost {cost:.2f}"] if math.isfinite(cost) or not parts else parts)
         self.progress(report.iteration, f": {text}", self.total)
         if report.fresh and not sys.stderr.isatty():

@@ -268,7 +268,9 @@ def test_folders_without_a_policy(capsys, tmp_path, command):
 @pytest.mark.parametrize("command", ["evaluate", "export"])
 def test_a_stage_that_was_not_learned(run, capsys, command):
     said = refused(capsys, command, run, "--stage", "flying")
-    assert f"{run}: there is no stage 'flying'; there are locomotion, ball, linear; give another" in said
+    assert (
+        f"{run}: there is no stage 'flying'; there are locomotion, ball, linear, policy; give another" in said
+    )
     said = refused(capsys, command, run, "--stage", "ball")
     assert f"{run}: has no policy yet: no ball was learned" in said
 
