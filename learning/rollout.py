@@ -102,6 +102,8 @@ class Rollout:
         self.task, self.controller, self.chooser, self.disturber = task, controller, chooser, disturber
         self.k = np.array(starts.k)
         """(worlds,) fragment that each world is in"""
+        self.failed = np.zeros(task.worlds, bool)
+        """(worlds,) who has failed in the last fragment"""
         self.row = 0
         self._began = np.zeros(task.worlds, bool)
         task.calm()
@@ -151,6 +153,7 @@ class Rollout:
     def _end(self, obs: np.ndarray, action: np.ndarray) -> Fragment:
         cost, failed = self.task.judge(self.k)
         self.row += 1
+        self.failed = failed
         return Fragment(self.row - 1, self.k, obs, action, cost, failed)
 
     def _follow(self) -> None:

@@ -21,6 +21,8 @@ class Trajectory:
     """(frames, nq) what it should have done"""
     wall_time: float = 0.0
     """[s] that simulating it took, with all worlds beside it"""
+    lost: float = np.nan
+    """[s] after which a policy had fallen or lost the ball; NaN for never"""
 
     @property
     def frame_count(self) -> int:

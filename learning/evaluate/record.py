@@ -38,21 +38,24 @@ def record(
     wanted: list[np.ndarray] = []
     begins = graph.start_q[starts.k[chosen]]
     at = np.concatenate([starts.joint_q[chosen, :2], planar(begins)[:, 2:]], axis=1)
-    spent, began = 0.0, time.perf_counter()
+    spent, began, lost = 0.0, time.perf_counter(), np.full(len(chosen), np.nan)
     for step in rollout.steps(fragments):
         spent += time.perf_counter() - began
         joint_q.append(sim.joint_q[chosen])
         body_q.append(sim.body_q[chosen])
+        if step == 0 and len(wanted):
+            lost[rollout.failed[chosen] & np.isnan(lost)] = len(wanted) * graph.period
         if step == STEPS - 1:
             rows, at = _reference(model, graph, rollout.k[chosen], at)
             wanted.append(rows if len(wanted) == fragments - 1 else rows[:-1])
             if progress:
                 progress(len(wanted))
         began = time.perf_counter()
+    lost[rollout.failed[chosen] & np.isnan(lost)] = fragments * graph.period
     sound = sim.status[chosen] & NONFINITE == 0
     moved, seen, reference = np.array(joint_q), np.array(body_q), np.concatenate(wanted)
     return [
-        Trajectory(moved[:, w], seen[:, w], graph.timestep, reference[:, w], spent)
+        Trajectory(moved[:, w], seen[:, w], graph.timestep, reference[:, w], spent, float(lost[w]))
         for w in np.flatnonzero(sound)
     ]
 

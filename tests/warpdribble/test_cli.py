@@ -118,7 +118,7 @@ def test_help_is_given(capsys, arguments):
 
 def test_demo_leaves_a_valid_take_and_a_picture(capsys, tmp_path):
     out = tmp_path / "new" / "demo.usdc"
-    assert main(["demo", "--repeat", "2", "--out", str(out)]) == 0
+    assert main(["demo", "--seconds", "1.4", "--out", str(out)]) == 0
     assert validate(out) == []
     beside = ["demo.html", "demo.plots.png", "demo.png", "demo.usdc"]
     assert sorted(p.name for p in out.parent.iterdir()) == beside
@@ -131,7 +131,7 @@ def test_a_take_as_asked_for(capsys, tmp_path):
     from pxr import Usd
 
     out = tmp_path / "as" / "demo.usda"
-    arguments = ["demo", "--repeat", "1", "--skin", "--usd-joints", "d6", "--no-html", "--out", str(out)]
+    arguments = ["demo", "--seconds", "0.7", "--skin", "--usd-joints", "d6", "--no-html", "--out", str(out)]
     assert main(arguments) == 0
     assert validate(out) == []
     layers = [f"demo.{name}" for name in ("animation.usdc", "physics.usda", "plots.png", "png", "scene.usdc")]

@@ -6,12 +6,13 @@ wrong with the input is raised as ValueError or OSError, its message one line th
 
 from typing import Protocol
 
+from .demo import Demo
 from .evaluate import Evaluate
 from .export import Export
 from .fetch import Fetch
 from .learn import Learn
 from .motion import MotionGroup
-from .simulate import Demo, Simulate
+from .simulate import Simulate
 from .skill import SkillGroup
 
 

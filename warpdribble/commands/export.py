@@ -61,6 +61,7 @@ class Export(Outputs):
             f"skill     {one.skill['name']}: {one.skill['description']}, "
             f"learned in {one.iteration} iterations"
         )
-        tracking = say_trajectory(task.model, seen[0], "free", played=one.stage.ball)
+        cycles = fragments / one.graph.cycle if one.stage.ball else None
+        tracking = say_trajectory(task.model, seen[0], "free", cycles)
         write_outputs(self, task.model, seen[0], tracking, f"{one.skill['name']}, learned", "free")
         return 0

@@ -83,8 +83,8 @@ def write_outputs(
         say(f"replay    {replay} (open it in a browser)")
 
 
-def say_trajectory(model: Model, seen: Trajectory, root: str, played: bool = False) -> Tracking:
-    """Say how it went, and measure it. played: a policy has the ball."""
+def say_trajectory(model: Model, seen: Trajectory, root: str, cycles: float | None = None) -> Tracking:
+    """Say how it went, and measure it. cycles: so many of them a policy tried to keep the ball."""
     import numpy as np
 
     from ..learning.evaluate.tracking import track
@@ -107,6 +107,9 @@ def say_trajectory(model: Model, seen: Trajectory, root: str, played: bool = Fal
     if "ball on ground" in found.contacts:
         ground = found.contacts["ball on ground"]
         bounces = int(np.sum(ground[1:] & ~ground[:-1]))
-        how = "kept in play by what was learned" if played else "put in play, nobody controls it"
+        how = "put in play, nobody controls it"
+        if cycles is not None:
+            lost = "never lost" if np.isnan(seen.lost) else f"lost after {seen.lost:.2f} s"
+            how = f"{cycles:.1f} cycles, {lost}"
         say(f"ball      {bounces} bounces ({how})")
     return found

@@ -1,19 +1,17 @@
-"""`warpdribble simulate` and `warpdribble demo`: a clip or a skill becomes a simulated take."""
+"""`warpdribble simulate`: a clip or a skill becomes a simulated take."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from .clip_input import ClipInput
-from .console import bar, check_device, check_range, compiling, quiet_warp, say, warmed
+from .console import bar, check_device, compiling, quiet_warp, say, warmed
 from .output import Outputs, check_outputs, say_trajectory, write_outputs
 
 if TYPE_CHECKING:
     from ..learning.rollout import Controller
     from ..learning.starts import Starts
-    from ..learning.tasks.disturbance import Disturber
     from ..learning.tasks.follow import Follow
     from ..sims import Model, Reference
     from ..sims.trajectory import Trajectory
@@ -23,9 +21,6 @@ LONGEST = 600.0
 """[s] of one take."""
 SHORT = 60.0
 """[s] up to which several starts of the ball are tried: all of them are kept in memory."""
-
-LEARNED = "dribble-right-authored"
-"""The shipped controller of the demo."""
 
 
 @dataclass
@@ -111,48 +106,7 @@ class Simulate(ClipInput, Outputs):
         return bare, replace(reference, joint_q=bare.convert_q(model, reference.joint_q))
 
 
-@dataclass
-class Demo(Outputs):
-    """A player that has learned it dribbles, on its own feet; needs no data."""
-
-    repeat: int = 5
-    """How many dribbles."""
-    push: float = 0.0
-    """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
-    out: Path = Path("out/demo.usdc")
-    """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
-
-    def run(self) -> int:
-        import numpy as np
-
-        from ..learning import Disturbance, Run, Streams
-        from ..learning.evaluate.attempts import TRIES
-        from ..learning.methods import STAGES
-        from ..learning.tasks.disturbance import Disturber
-
-        _check(self)
-        check_range("--push", self.push, 0.0, 1e4)
-        one = Run.load(LEARNED).learned(STAGES)
-        cycle = one.graph.cycle * one.graph.period
-        _check_length(cycle, self.repeat)
-        say(f"skill     {one.skill['name']}, {cycle:.2f} s a cycle, learned")
-        with compiling():
-            task = warmed(one.task(TRIES, self.device))
-        streams = Streams([np.random.default_rng(0)], TRIES)
-        pushes = Disturber(Disturbance(push=self.push), streams)
-        begin = one.starts.draw(streams)
-        seen = _record(task, one.controller, begin, self.repeat * one.graph.cycle, pushes)
-        tracking = say_trajectory(task.model, seen, "free", played=True)
-        write_outputs(self, task.model, seen, tracking, "authored dribble, learned", "free")
-        say(
-            "next      open the take in Blender (or any USD viewer); push: warpdribble demo --push 300;\n"
-            "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"
-            "          or learn one, warpdribble learn SKILL --out RUN"
-        )
-        return 0
-
-
-def _check(command: Simulate | Demo) -> None:
+def _check(command: Simulate) -> None:
     """Raise ValueError or OSError for what cannot work, before anything is computed."""
     if command.repeat < 1:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
@@ -172,18 +126,12 @@ def _title(one: StagedSkill) -> str:
     return one.skill.description if one.skill.is_clip else f"{one.skill.name}: {one.skill.description}"
 
 
-def _record(
-    task: Follow,
-    controller: Controller,
-    begin: Starts,
-    fragments: int | None = None,
-    disturber: Disturber | None = None,
-) -> Trajectory:
+def _record(task: Follow, controller: Controller, begin: Starts) -> Trajectory:
     """Simulate all worlds of a task along its graph; the one whose ball is in play longest."""
     from ..learning.evaluate.attempts import longest_in_play
     from ..learning.evaluate.record import record
 
-    count = fragments or task.graph.count
+    count = task.graph.count
     with bar(f"simulating {count * task.graph.period:.1f} s", count) as progress:
         seen = record(
             task,
@@ -191,7 +139,6 @@ def _record(
             begin,
             count,
             worlds=range(task.worlds),
-            disturber=disturber,
             progress=progress,
         )
     return longest_in_play(task.model, seen)
