@@ -28,7 +28,7 @@ from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
 from ..runs.stage import Arrays, Context, Report, Stage
 from ..starts import Starts, Streams
-from ..tasks.arms import STATES, Arms, BallWeights
+from ..tasks.arms import STATES, Arms, BallWeights, misplaced
 from ..tasks.disturbance import CALM, Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
@@ -192,10 +192,7 @@ class Ppo:
             other, mine = self.own.draw(streams, c.speed_noise * self.hardness), random.random(count) < 0.5
             for name, part in vars(start).items():
                 part[mine] = vars(other)[name][mine]
-        model = self.task.model
-        ball = model.q_slice(model.roles.one("ball_joint")).start
-        off = self.hardness * c.place_noise / np.sqrt(3.0)
-        start.joint_q[:, ball : ball + 3] += off * random.standard_normal((count, 3))
+        misplaced(self.task.model, start, self.hardness * c.place_noise, random)
         return start
 
     # ------------------------------------------------------------------------------------------ learning

@@ -245,6 +245,12 @@ ARMS = 14
 RESTITUTION = 0.8
 
 
+def misplaced(model: Model, starts: Starts, off: float, random: np.random.Generator) -> None:
+    """Put the ball of each state off its place, by `off` [m] (root mean square) in any direction."""
+    ball = model.q_slice(model.roles.one("ball_joint")).start
+    starts.joint_q[:, ball : ball + 3] += off / np.sqrt(3.0) * random.standard_normal((len(starts), 3))
+
+
 def _forearms(model: Model) -> list[str]:
     return [model.body_names[model.joint_body(elbow)] for elbow in model.roles.both("elbows")]
 
