@@ -3,7 +3,7 @@
 
 PYTHON ?= python3
 VENV   ?= .venv
-EXTRAS ?= dev,learn
+EXTRAS ?= dev,learn,onnx
 PY     := $(VENV)/bin/python
 BARE   := $(VENV)/.stamp-
 STAMP  := $(BARE)$(EXTRAS)

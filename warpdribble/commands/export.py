@@ -1,4 +1,4 @@
-"""`warpdribble export`: a learned policy becomes a take."""
+"""`warpdribble export`: a learned policy becomes a take, or an ONNX model."""
 
 from __future__ import annotations
 
@@ -25,8 +25,12 @@ class Export(Outputs):
     """[N] Largest force of random pushes of 0.2 s on the torso, every 3 s or so."""
     seed: int = 0
     """Of the start and the pushes."""
+    onnx: Path | None = None
+    """Write the network of the stage `policy` to this file instead, and no take."""
 
     def run(self) -> int:
+        if self.onnx is not None:
+            return self._network(self.onnx)
         import numpy as np
 
         from ..learning import Disturbance, RandomWalk, Run, Streams
@@ -64,4 +68,27 @@ class Export(Outputs):
         cycles = fragments / one.graph.cycle if one.stage.ball else None
         tracking = say_trajectory(task.model, seen[0], "free", cycles)
         write_outputs(self, task.model, seen[0], tracking, f"{one.skill['name']}, learned", "free")
+        return 0
+
+    def _network(self, path: Path) -> int:
+        """Write what decides as an ONNX model."""
+        from ..learning import STAGES, Run
+        from ..learning.policies.network import NetworkPolicy
+        from ..learning.policies.onnx import onnx_model
+        from ..sims.errors import InputError
+        from ..sims.files import whole
+        from ..takes.take import check_writable
+
+        one = Run.load(self.folder).learned(STAGES, self.stage or "policy")
+        if not isinstance(one.controller, NetworkPolicy):
+            raise InputError(f"what {one.stage.name} has learned is no network", self.folder, "stage")
+        check_writable(path, (".onnx",))
+        model = onnx_model(one.controller, f"{one.skill['name']}, {one.iteration} iterations")
+        with whole(path) as part:
+            part.write_bytes(model.SerializeToString())
+        policy = one.controller
+        say(
+            f"network   {path} (s (n, {len(policy.mean)}) float32, k (n,) int64 of {len(policy.a_hat)} "
+            f"fragments -> action (n, {policy.a_hat.shape[1]}))"
+        )
         return 0

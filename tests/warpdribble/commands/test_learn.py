@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import sys
 from dataclasses import replace
 from functools import partial
 
@@ -11,6 +13,8 @@ import pytest
 from warpdribble.cli import main
 from warpdribble.learning.methods import STAGES
 from warpdribble.learning.methods.samcon import Samcon, SamconConfig
+from warpdribble.learning.policies.network import Network, NetworkPolicy
+from warpdribble.learning.runs.folder import Run, read_result
 from warpdribble.learning.runs.log import read_rows
 from warpdribble.skills.graph import skill_graph
 from warpdribble.skills.skill import parse_skill
@@ -255,6 +259,68 @@ def test_what_cannot_be_exported(run, capsys, tmp_path, monkeypatch, arguments, 
     monkeypatch.chdir(tmp_path)
     assert said in refused(capsys, "export", run, *arguments)
     assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+
+
+@pytest.fixture(scope="module")
+def networked(tmp_path_factory):
+    """The shipped run with a made-up result of the stage `policy`, and the policy in it."""
+    folder = tmp_path_factory.mktemp("networked") / "run"
+    shutil.copytree(Run.load(NAME).folder, folder)
+    rng, obs, actions, fragments, width = np.random.default_rng(3), 76, 20, 14, 8
+    sizes = {"W1": (obs, width), "e": (fragments, width), "W2": (width, width), "b2": (width,),
+             "W3": (width, actions), "b3": (actions,)}  # fmt: skip
+    policy = NetworkPolicy(
+        0.01 * rng.normal(size=(fragments, actions, obs)),
+        0.1 * rng.normal(size=(fragments, actions)),
+        rng.normal(size=obs),
+        rng.uniform(0.1, 2.0, obs),
+        np.array(0.04),
+        Network(**{name: rng.normal(size=size).astype(np.float32) for name, size in sizes.items()}),
+    )
+    linear = read_result(folder / "linear")
+    states = {name: part for name, part in linear.items() if name.startswith("states.")}
+    kept = Run.load(folder).stage(STAGES["policy"])
+    kept.make()
+    kept.begin(STAGES["policy"].config(), {})
+    kept.save_result(policy.arrays | states, 7)
+    return folder, policy
+
+
+def test_a_network_is_exported_whole(networked, capsys, tmp_path):
+    """What the file does is what the run's policy does, in states as it feels them; nothing is simulated."""
+    reference = pytest.importorskip("onnx.reference")
+    folder, policy = networked
+    path = tmp_path / "new" / "policy.onnx"
+    assert main(["export", str(folder), "--onnx", str(path)]) == 0
+    assert "s (n, 76) float32, k (n,) int64 of 14 fragments -> action (n, 20)" in capsys.readouterr().out
+    assert [p.name for p in path.parent.iterdir()] == ["policy.onnx"]
+    s = np.random.default_rng(0).normal(0.0, 3.0, (50, 76)).astype(np.float32)
+    k = np.arange(50) % 14
+    (action,) = reference.ReferenceEvaluator(str(path)).run(None, {"s": s, "k": k})
+    np.testing.assert_allclose(action, policy.act(s, k), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--stage", "linear"), "what linear has learned is no network; give another --stage"),
+        (("--onnx", "policy.txt"), "name the output with one of .onnx"),
+    ],
+)
+def test_what_is_no_network_file(networked, capsys, tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    assert said in refused(capsys, "export", networked[0], "--onnx", "policy.onnx", *arguments)
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_network_without_the_stage_or_the_package(networked, capsys, tmp_path, monkeypatch):
+    path = tmp_path / "policy.onnx"
+    said = refused(capsys, "export", NAME, "--onnx", path)
+    assert "has no policy yet: no policy was learned; warpdribble learn SKILL --out RUN learns one" in said
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    said = refused(capsys, "export", networked[0], "--onnx", path)
+    assert "needs the package 'onnx': pip install 'warpdribble[onnx]'" in said
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("command", ["evaluate", "export"])
