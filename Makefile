@@ -3,7 +3,7 @@
 
 PYTHON ?= python3
 VENV   ?= .venv
-EXTRAS ?= dev,learn,onnx
+EXTRAS ?= dev,gym,learn,onnx
 PY     := $(VENV)/bin/python
 BARE   := $(VENV)/.stamp-
 STAMP  := $(BARE)$(EXTRAS)

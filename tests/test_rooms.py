@@ -19,7 +19,7 @@ FLOORS = (
     "kernels assets",
     "sims",
     "learning",
-    "clips skin takes web skills simulate",
+    "clips skin takes web skills simulate gym",
     "commands benchmarks reports",
     "cli __main__",
 )
