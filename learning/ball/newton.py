@@ -22,6 +22,7 @@ from ..tasks.fingers import FINGERS
 from . import paper
 from .cycles import Chosen, Cycles
 from .paper import PaperConfig
+from .sweeps import SweepConfig, swept
 from .windows import Tried, actions_of, attempt, windows_of
 
 LANES = 8
@@ -74,8 +75,10 @@ class NewtonConfig:
     """of a descent, at most"""
     part: int = 4
     """fragments at a time, where a whole window is too much at once"""
-    search: PaperConfig = field(default=PaperConfig())
+    sweeps: SweepConfig = field(default=SweepConfig())
     """where no step leads to a window that keeps the ball"""
+    search: PaperConfig = field(default=PaperConfig())
+    """where sweeps do not either"""
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,9 @@ class Newton(Cycles):
                 self.room = room
                 at, slope = self._by_parts(k, starts[0])
         self.room = self.config.room
+        if not at.keeps and (action := self._swept(k)) is not None:
+            at = self._best(self.tasks[0], k, action[self.active[k]][None])
+            at, slope = self._descend(k, at, None, enough)
         chosen = None
         if at.keeps:
             chosen = self._chosen(at)
@@ -195,6 +201,11 @@ class Newton(Cycles):
             if not at.keeps:
                 break
         return replace(at, keeps=at.keeps and end == len(k)), slope
+
+    def _swept(self, k: np.ndarray) -> np.ndarray | None:
+        """A way that sweeps of particles find."""
+        random = np.random.default_rng((self.seed, self.iteration, 1))
+        return swept(self.tasks[2], self.begin, k, np.zeros_like(self.known(k)), self.config.sweeps, random)
 
     def _chosen(self, at: Point) -> Chosen:
         count = len(self.window())

@@ -80,7 +80,7 @@ def compared(
     return Recovered(
         clip,
         seconds,
-        covered,
+        min(1.0, covered),
         len(other),
         len(off),
         1000.0 * float(np.median(off)) if off else np.nan,
