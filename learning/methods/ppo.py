@@ -28,8 +28,8 @@ from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
 from ..runs.stage import Arrays, Context, Report, Stage
 from ..starts import Starts, Streams
-from ..tasks.arms import STATES, Arms, BallWeights, misplaced
-from ..tasks.disturbance import CALM, Disturbance, Disturber
+from ..tasks.arms import RESTITUTION, STATES, Arms, BallWeights, misplaced
+from ..tasks.disturbance import Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
 from .ball import arms
@@ -69,9 +69,10 @@ class PpoConfig:
     """[rad/s, m/s] standard deviation of what is added to all joint velocities at a start, the ball's too"""
     place_noise: float = 0.01
     """[m] of how far off the ball is"""
-    restitution: float = 0.0
+    restitution: float = 0.05
     """that of ball and ground is drawn for each world from so far around the model's"""
-    disturbance: Disturbance = field(default=CALM)
+    disturbance: Disturbance = field(default=Disturbance(push=150.0))
+    """pushes grow with the noise of starts"""
     enough: float = 0.99
     """share of the trials to survive, from starts as disturbed as they shall be, after which it is done"""
     episode: int = 200
@@ -96,6 +97,8 @@ POOL = 2048
 """States of the policy's own way that are kept to start from."""
 KEPT = 64
 """of them from a batch"""
+SHOWN = 512
+"""of them that are kept with the policy"""
 
 
 @dataclass
@@ -142,10 +145,10 @@ class Ppo:
     def __init__(self, task: Arms, trial_task: Arms, config: PpoConfig, found: Optimised, seed: int = 0):
         self.task, self.trial_task, self.config, self.seed = task, trial_task, config, seed
         c, graph = config, task.graph
-        states = states_of(task, found)
-        obs = observed(task, states)
         from ..policies.actor_critic import ActorCritic  # torch, which only learning needs
 
+        states = states_of(task, found)
+        obs = observed(task, states)
         drop = c.drop * graph.cycle
         base = regressed(found, obs, graph.count, drop, c.first_ridge, c.sigma)
         if c.base == "offsets":
@@ -169,8 +172,8 @@ class Ppo:
         start = self._starts(random, task.worlds)
         self.rollout = Rollout(task, self._drawn(random), self._walk(random), start, self.disturber)
         if c.restitution:
-            ball, middle = task.model.roles.one("ball"), 0.8
-            spread = middle + c.restitution * random.uniform(-1.0, 1.0, task.worlds)
+            ball = task.model.roles.one("ball")
+            spread = RESTITUTION + c.restitution * random.uniform(-1.0, 1.0, task.worlds)
             task.sim.set_contact(ball, "ground", restitution=spread)
         self._beside = ThreadPoolExecutor(1)
 
@@ -201,7 +204,7 @@ class Ppo:
         """Simulate a batch, and meanwhile learn from the one before; now and then try the policy."""
         began = time.perf_counter()
         random = np.random.default_rng((self.seed, 1, self.iteration))
-        next_batch = self._beside.submit(self._simulate, random)
+        next_batch = self._beside.submit(self._simulate, random, self._drawn(random))
         spent = 0.0
         if self.batch is not None:
             self._learn(self.batch)
@@ -233,11 +236,12 @@ class Ppo:
             learning=spent / seconds,
         )
 
-    def _simulate(self, random: np.random.Generator) -> Batch:
+    def _simulate(self, random: np.random.Generator, drawn: Drawn) -> Batch:
+        """Go on in all worlds for a batch. Runs beside `_learn`: it must not look at the networks."""
         c, task, graph = self.config, self.task, self.task.graph
-        drawn = self._drawn(random)
         self.rollout.controller, self.rollout.chooser = drawn, self._walk(random)
         self.disturber.streams = Streams([random], task.worlds)
+        self.disturber.what = replace(c.disturbance, push=self.hardness * c.disturbance.push)
         shape = (c.steps, task.worlds)
         x = np.empty((c.steps + 1, task.worlds, task.obs), np.float32)
         k = np.empty((c.steps + 1, task.worlds), int)
@@ -297,7 +301,8 @@ class Ppo:
         score = float(trials.lived.mean()) - 0.01 * trials.cost if trials.lived.any() else -1.0
         if score > self.best_score:
             self.best, self.best_score = self.policy, score
-            self.best_starts = self.own if len(self.own) else self.found
+            ways = self.own if len(self.own) else self.found
+            self.best_starts = Starts(*(part[-SHOWN:] for part in vars(ways).values()))
         survived = float(trials.survived.mean())
         self._enough = survived >= c.enough and self.hardness == 1.0
         return survived

@@ -19,6 +19,7 @@ class ActorCritic:
     Adam at first."""
 
     def __init__(self, obs: int, actions: int, fragments: int, width: int, rate: float, seed: int):
+        torch.set_num_threads(1)  # the other cores simulate; and two on busy cores wait for each other
         random = np.random.default_rng((seed, 3))
         self.actor = layers(random, obs, fragments, width, actions, 0.01)
         self.critic = layers(random, obs, fragments, width, 1, 1.0)

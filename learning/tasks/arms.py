@@ -243,6 +243,7 @@ class Arms(Locomotion):
 ARMS = 14
 """Columns of both arms: shoulders, elbows, wrists; the fingers' follow."""
 RESTITUTION = 0.8
+"""of the ball on the ground"""
 
 
 def misplaced(model: Model, starts: Starts, off: float, random: np.random.Generator) -> None:

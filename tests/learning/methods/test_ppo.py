@@ -1,5 +1,6 @@
 """PPO: its advantages and its objective against the definitions, and a short run of it."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,7 @@ def context():
     """Of the shipped dribble; in place of what trajectory optimisation finds, two cycles that the shipped
     policy goes through."""
     run = Run.load(SKILL)
-    one = run.learned(STAGES, "linear")
+    one = run.learned(STAGES, "policy")
     task = one.task(1)
     start = Starts(*(part[:1] for part in vars(one.starts).values()))
     rollout = Rollout(task, one.controller, Ahead(), start)
@@ -163,6 +164,22 @@ def test_a_state_goes_on_to_the_bit(learned, context):
     while not other.done:
         other.iterate()
     for name, value in learned[0].state.items():
+        np.testing.assert_array_equal(other.state[name], value, err_msg=name)
+
+
+def test_a_slow_learner_simulates_the_same(context, monkeypatch):
+    """What is simulated beside learning does not see what is learned meanwhile, whichever is slower."""
+    one, other = ppo.make(context), ppo.make(context)
+    simulate = other._simulate
+
+    def late(*args):
+        time.sleep(0.3)
+        return simulate(*args)
+
+    monkeypatch.setattr(other, "_simulate", late)
+    for _ in range(4):
+        one.iterate(), other.iterate()
+    for name, value in one.state.items():
         np.testing.assert_array_equal(other.state[name], value, err_msg=name)
 
 
