@@ -71,7 +71,9 @@ class Evaluate:
         with compiling():
             task = warmed(one.task(self.trials, self.device))
         graph = task.graph
-        cycles = self.cycles if self.seconds is None else self.seconds / (graph.cycle * graph.period)
+        cycles = self.cycles
+        if self.seconds is not None:
+            cycles = max(1, round(self.seconds / graph.period)) / graph.cycle
         controller = OpenLoop(task.actions) if self.open_loop else one.controller
         with bar(f"{self.trials} trials", max(1, round(cycles * graph.cycle))) as progress:
             trials = run_trials(

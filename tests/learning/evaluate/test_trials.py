@@ -118,6 +118,7 @@ def test_some_fall(task, graph):
     worlds = task(19)
     trials = run_trials(worlds, open_loop(worlds), reference_starts(graph), 2, seed=6, speed_noise=0.5)
     assert 2 < trials.survived.sum() < 17
+    np.testing.assert_array_equal(trials.fell, ~trials.survived)  # there is no ball to lose
     assert ((trials.lived == 1.0) == trials.survived).all() and len(np.unique(trials.lived)) > 3
     check(trials, by_hand(worlds, reference_starts(graph), 6, 2, 0.5))
 

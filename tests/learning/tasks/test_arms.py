@@ -66,6 +66,40 @@ def test_on_the_reference_nothing_is_felt(made):
         np.testing.assert_allclose(task.observe(k), 0.0, atol=2e-3, err_msg=state)
 
 
+def test_a_full_state_feels_how_fast_the_arms_turn_and_what_was_done_last(made):
+    """What the state `ballistic` feels, then joint speeds off the reference's by joint, then offsets of the
+    arm that acts."""
+    task, other = made(state="full"), made(state="ballistic")
+    model, k = task.model, np.array([3, 9])
+    q, qd = task.graph.start_q[k].copy(), task.graph.start_qd[k].copy()
+    arms = [f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist") for side in "lr"]
+    dofs = np.concatenate([np.arange(model.nv)[model.dof_slice(joint)] for joint in arms])
+    speed = np.random.default_rng(0).normal(size=(2, len(dofs)))
+    qd[:, dofs] += speed
+    for one in (task, other):
+        one.reset(Starts(k, q, qd))
+    felt, less = task.observe(k), other.observe(k)
+    assert task.obs == felt.shape[1] == other.obs + 14 + 2 * ARM
+    np.testing.assert_allclose(felt[:, : other.obs], less, atol=1e-6)
+    np.testing.assert_allclose(felt[:, other.obs : other.obs + 14], speed / 3.0, atol=1e-5)
+    np.testing.assert_array_equal(felt[:, -2 * ARM :], 0.0)
+    action = np.full((2, 2 * ARM), 0.02)
+    task.advance(k, action)
+    task.judge(k)
+    felt = task.observe(task.graph.follow(k))
+    np.testing.assert_allclose(felt[:, -2 * ARM :], np.where(task.active[k], 0.2, 0.0), atol=1e-12)
+
+
+def test_who_loses_the_ball_has_not_fallen(dribble):
+    free = np.full(2, int(np.flatnonzero(dribble.held == 0)[0]))
+    starts = begun(dribble, free[0], ball=[3.0, 0.0, 1.0])
+    starts.joint_q[1, 2] -= 0.5
+    dribble.reset(starts)
+    dribble.advance(free, np.zeros((2, 2 * ARM)))
+    _, failed = dribble.judge(free)
+    assert failed.tolist() == [True, True] and dribble.fallen.tolist() == [False, True]
+
+
 def test_fingers_are_measured_over_the_steps_of_H(dribble):
     """Eq. 7 over the frames of a fragment, and at its checkpoint, from poses after every step."""
     graph, k = dribble.graph, int(dribble.graph.checkpoints[0]) // STEPS
