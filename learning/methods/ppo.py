@@ -390,5 +390,6 @@ STAGE = Stage(
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),
+    packages=("torch",),
     save_iterations=1000,
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -94,6 +95,13 @@ class Stage:
     """those of them without which its own result does nothing; None for all"""
     ball: bool = False
     """only for a skill in which somebody plays with one"""
+    packages: tuple[str, ...] = ()
+    """that learning needs, beyond what is always there; they come with the extra `learn`"""
     save_iterations: int = 1
     save_seconds: float = 30.0
     """A checkpoint is written after so many iterations, or so much time, whichever comes first."""
+
+    @property
+    def missing(self) -> list[str]:
+        """Packages that learning needs and that are not there."""
+        return [name for name in self.packages if find_spec(name) is None]

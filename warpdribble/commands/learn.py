@@ -88,6 +88,10 @@ class Learn:
             stages = [STAGES[self.stage]]
         elif not plays and one.ball:
             say("          nobody plays with a ball: locomotion only")
+        for stage in stages:
+            if stage.missing:
+                lacks = f"the stage {stage.name} needs the package '{stage.missing[0]}'"
+                raise InputError(f"{lacks}: pip install 'warpdribble[learn]'")
         for number, stage in enumerate(stages):
             if code := self._learn(run, stage):
                 return code

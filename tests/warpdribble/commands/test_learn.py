@@ -102,6 +102,14 @@ def test_a_run_that_is_stopped_says_how_to_go_on(small, capsys, tmp_path, monkey
     assert said.endswith("run: has no policy yet; let it go on with the same warpdribble learn\n")
 
 
+def test_what_is_not_installed_is_said_before_anything_is_learned(capsys, tmp_path, monkeypatch):
+    """Not after the minutes that the stages before it take."""
+    monkeypatch.setattr("warpdribble.learning.runs.stage.find_spec", lambda name: None)
+    said = refused(capsys, "learn", NAME, "--out", tmp_path / "run")
+    assert "the stage policy needs the package 'torch': pip install 'warpdribble[learn]'" in said
+    assert not (tmp_path / "run" / "locomotion").exists()
+
+
 def test_an_evaluation_is_json(run, capsys):
     report = evaluated(capsys, run, "--cycles", "2", "--trials", "20")
     assert {"skill", "seed", "lived", "cost", "angle_error_deg", "end_error_cm"} < set(report)
