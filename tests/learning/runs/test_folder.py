@@ -296,7 +296,7 @@ def test_what_cannot_be_used_yet_is_said(own, tmp_path, graph):
 def test_shipped_controllers_are_runs(name):
     """Found by name; a folder of that name comes first."""
     run = Run.load(name)
-    assert run.learned(STAGES).stage.name == "linear"
+    assert run.learned(STAGES).stage.name == "policy"
     one = run.learned(STAGES, "locomotion")
     assert run.folder.name == name and one.skill["name"] == name
     assert len(one.controller.M) == one.graph.count and len(one.starts) > 50
