@@ -22,7 +22,7 @@ import numpy as np
 from ...sims.errors import InputError
 from ..ball.optimised import Optimised, observed, states_of
 from ..choose import RandomWalk
-from ..evaluate.trials import run_trials
+from ..evaluate.trials import record_starts, run_trials
 from ..policies.batch import Batch, advantages
 from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
@@ -97,8 +97,9 @@ POOL = 2048
 """States of the policy's own way that are kept to start from."""
 KEPT = 64
 """of them from a batch"""
-SHOWN = 512
-"""of them that are kept with the policy"""
+SPARSE, SETTLED, AHEAD = 3, 20, 40
+"""[fragments] States to start from are every third that the policy comes through, a second after a start, and
+lives on from for two."""
 
 
 @dataclass
@@ -301,8 +302,9 @@ class Ppo:
         score = float(trials.lived.mean()) - 0.01 * trials.cost if trials.lived.any() else -1.0
         if score > self.best_score:
             self.best, self.best_score = self.policy, score
-            ways = self.own if len(self.own) else self.found
-            self.best_starts = Starts(*(part[-SHOWN:] for part in vars(ways).values()))
+            self.best_starts = record_starts(
+                self.trial_task, self.policy, start, self.seed, every=SPARSE, settled=SETTLED, ahead=AHEAD
+            )
         survived = float(trials.survived.mean())
         self._enough = survived >= c.enough and self.hardness == 1.0
         return survived
