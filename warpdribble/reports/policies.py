@@ -21,7 +21,7 @@ from ..learning.runs.folder import RESULT, RUN, Run, read_result
 from ..learning.runs.log import read_rows
 from .markers import check_page, write_measured
 
-TRIALS = 128
+TRIALS = 64
 CYCLES, FEW = 1000, 100
 """that a trial lasts: from the policy's own way, and from there with noise"""
 NOISE = 0.15
@@ -82,6 +82,10 @@ def _counts(trials: Trials, cycles: int) -> dict[str, float]:
     }
 
 
+def _whole(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.0f}"
+
+
 def table(runs: list[Measured]) -> str:
     """As Markdown."""
     lines = [
@@ -98,8 +102,8 @@ def table(runs: list[Measured]) -> str:
         cells = [
             f"{skill}: {run['description']}",
             str(run["seed"]),
-            *(f"{seconds[name]:.0f}" for name in ("locomotion", "ball", "policy")),
-            f"{sum(seconds.values()) / 60.0:.0f}",
+            *(_whole(seconds[name]) for name in ("locomotion", "ball", "policy")),
+            _whole(sum(seconds.values()) / 60.0),
             f"{PUBLISHED[skill]:.1f}" if skill in PUBLISHED else "-",
             str(run["calm"]["survived"]),
             str(run["noisy"]["survived"]),
