@@ -97,7 +97,7 @@ def test_it_is_the_closed_loop(env):
     run = Run.load(NAME)
     task = ppo.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), env.num_envs)
     streams = Streams([random], env.num_envs)
-    start = run.learned(STAGES, "linear").starts.draw(streams, 0.05)
+    start = run.learned(STAGES, "policy").starts.draw(streams, 0.05)
     ball = task.model.q_slice("ball").start
     start.joint_q[:, ball : ball + 3] += 0.01 / np.sqrt(3.0) * random.standard_normal((env.num_envs, 3))
     controller = Given(env._given.mean, 0.1)
@@ -161,7 +161,7 @@ def test_a_finished_world_begins_anew_in_the_next_step(wild):
     going[rows + 1, worlds] = False
     assert np.all(seen["reward"][going & ~over] > 0.0)
     run = Run.load(NAME)
-    starts = run.learned(STAGES, "linear").starts
+    starts = run.learned(STAGES, "policy").starts
     task = ppo.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), 16)
     known = np.concatenate([observed(task, starts), phases(task.graph)[starts.k]], axis=1)
     began = seen["obs"][rows + 2, worlds]
@@ -206,7 +206,7 @@ def test_who_fell_and_who_lost_the_ball_is_said(env):
 def test_actions_add_to_what_the_runs_policy_does_on_average(tmp_path):
     """Without any the ball is kept longer than by arms that follow the clip, as in a run without a policy."""
     shutil.copytree(Run.load(NAME).folder, tmp_path / "run")
-    shutil.rmtree(tmp_path / "run" / "linear")
+    shutil.rmtree(tmp_path / "run" / "policy")
     lasted = {}
     for run in (NAME, tmp_path / "run"):
         env = DribbleEnv(run, 16)

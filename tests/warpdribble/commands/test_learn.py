@@ -13,8 +13,7 @@ import pytest
 from warpdribble.cli import main
 from warpdribble.learning.methods import STAGES
 from warpdribble.learning.methods.samcon import Samcon, SamconConfig
-from warpdribble.learning.policies.network import Network, NetworkPolicy
-from warpdribble.learning.runs.folder import Run, read_result
+from warpdribble.learning.runs.folder import Run
 from warpdribble.learning.runs.log import read_rows
 from warpdribble.skills.graph import skill_graph
 from warpdribble.skills.skill import parse_skill
@@ -270,28 +269,10 @@ def test_what_cannot_be_exported(run, capsys, tmp_path, monkeypatch, arguments, 
 
 
 @pytest.fixture(scope="module")
-def networked(tmp_path_factory):
-    """The shipped run with a made-up result of the stage `policy`, and the policy in it."""
-    folder = tmp_path_factory.mktemp("networked") / "run"
-    shutil.copytree(Run.load(NAME).folder, folder)
-    rng, obs, actions, fragments, width = np.random.default_rng(3), 76, 20, 14, 8
-    sizes = {"W1": (obs, width), "e": (fragments, width), "W2": (width, width), "b2": (width,),
-             "W3": (width, actions), "b3": (actions,)}  # fmt: skip
-    policy = NetworkPolicy(
-        0.01 * rng.normal(size=(fragments, actions, obs)),
-        0.1 * rng.normal(size=(fragments, actions)),
-        rng.normal(size=obs),
-        rng.uniform(0.1, 2.0, obs),
-        np.array(0.04),
-        Network(**{name: rng.normal(size=size).astype(np.float32) for name, size in sizes.items()}),
-    )
-    linear = read_result(folder / "linear")
-    states = {name: part for name, part in linear.items() if name.startswith("states.")}
-    kept = Run.load(folder).stage(STAGES["policy"])
-    kept.make()
-    kept.begin(STAGES["policy"].config(), {})
-    kept.save_result(policy.arrays | states, 7)
-    return folder, policy
+def networked():
+    """A run with a network, and the policy in it."""
+    shipped = Run.load(NAME)
+    return shipped.folder, shipped.learned(STAGES, "policy").controller
 
 
 def test_a_network_is_exported_whole(networked, capsys, tmp_path):
@@ -311,7 +292,7 @@ def test_a_network_is_exported_whole(networked, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--stage", "linear"), "what linear has learned is no network; give another --stage"),
+        (("--stage", "locomotion"), "what locomotion has learned is no network; give another --stage"),
         (("--onnx", "policy.txt"), "name the output with one of .onnx"),
     ],
 )
@@ -321,9 +302,9 @@ def test_what_is_no_network_file(networked, capsys, tmp_path, monkeypatch, argum
     assert not list(tmp_path.iterdir())
 
 
-def test_no_network_without_the_stage_or_the_package(networked, capsys, tmp_path, monkeypatch):
+def test_no_network_without_the_stage_or_the_package(run, networked, capsys, tmp_path, monkeypatch):
     path = tmp_path / "policy.onnx"
-    said = refused(capsys, "export", NAME, "--onnx", path)
+    said = refused(capsys, "export", run, "--onnx", path)
     assert "has no policy yet: no policy was learned; warpdribble learn SKILL --out RUN learns one" in said
     monkeypatch.setitem(sys.modules, "onnx", None)
     said = refused(capsys, "export", networked[0], "--onnx", path)
@@ -375,7 +356,6 @@ def test_another_seed_is_another_run(run, capsys):
 
 
 def test_a_damaged_checkpoint_is_said(run, capsys, tmp_path):
-    import shutil
 
     shutil.copytree(run, tmp_path / "run")
     (tmp_path / "run" / "locomotion" / "checkpoint.npz").write_bytes(b"PK half")
