@@ -21,7 +21,7 @@ class Evaluate:
     """Try a learned policy: how many trials survive, how well it tracks, which pushes it stands."""
 
     folder: Positional[Path]
-    """The run, a folder that warpdribble learn wrote; or dribble-right-authored, which ships."""
+    """The run, a folder that warpdribble learn wrote; or what ships (warpdribble demo --list)."""
     cycles: float = 200.0
     """Length of a trial."""
     seconds: float | None = None

@@ -16,7 +16,7 @@ class Export(Outputs):
     """Simulate a learned policy, nothing holding the root; write a USD take and pictures."""
 
     folder: Positional[Path]
-    """The run, a folder that warpdribble learn wrote; or dribble-right-authored, which ships."""
+    """The run, a folder that warpdribble learn wrote; or what ships (warpdribble demo --list)."""
     seconds: float = 20.0
     """How long, in whole fragments of 0.05 s."""
     stage: str = ""
