@@ -73,6 +73,17 @@ def regressed(
     return policy
 
 
+def begun(
+    task: Arms, found: Optimised, cycles: int, ridge: float, sigma: float
+) -> tuple[LinearPolicy, Starts]:
+    """What learners of arm policies begin with: the regression of a trajectory on what the task feels in its
+    states, and these states, without those of the first `cycles`, unless there are not twice as many."""
+    states, drop = states_of(task, found), cycles * task.graph.cycle
+    policy = regressed(found, observed(task, states), task.graph.count, drop, ridge, sigma)
+    first = drop if len(found) >= 2 * drop else 0
+    return policy, Starts(*(part[first:] for part in vars(states).values()))
+
+
 class Linear(Samcon):
     """Learns a linear arm policy from a trajectory."""
 
@@ -86,13 +97,9 @@ class Linear(Samcon):
     ):
         super().__init__(tasks, trial_tasks, config, seed)
         self.found, task, c = found, tasks[0], config
-        states = states_of(task, found)
-        drop = c.drop * task.graph.cycle
-        obs = observed(task, states)
-        self.policy = regressed(found, obs, task.graph.count, drop, c.first_ridge, c.sigma)
+        self.policy, states = begun(task, found, c.drop, c.first_ridge, c.sigma)
         self.mean, self.best = self.policy.copy(), self.policy.copy()
-        first = drop if len(found) >= 2 * drop else 0
-        self.starts = self.best_starts = Starts(*(part[first:] for part in vars(states).values()))
+        self.starts = self.best_starts = states
 
     def iterate(self) -> samcon.Progress:
         """The first: try what the regression gave. Later ones: see `Samcon`."""

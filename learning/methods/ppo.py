@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...sims.errors import InputError
-from ..ball.optimised import Optimised, observed, states_of
+from ..ball.optimised import Optimised
 from ..choose import RandomWalk
 from ..evaluate.trials import record_starts, run_trials
 from ..policies.batch import Batch, advantages
@@ -33,7 +33,7 @@ from ..tasks.disturbance import Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
 from .ball import arms
-from .linear import regressed
+from .linear import begun
 
 
 @dataclass(frozen=True)
@@ -148,16 +148,11 @@ class Ppo:
         c, graph = config, task.graph
         from ..policies.actor_critic import ActorCritic  # torch, which only learning needs
 
-        states = states_of(task, found)
-        obs = observed(task, states)
-        drop = c.drop * graph.cycle
-        base = regressed(found, obs, graph.count, drop, c.first_ridge, c.sigma)
+        base, self.found = begun(task, found, c.drop, c.first_ridge, c.sigma)
         if c.base == "offsets":
             base.M = base.M[:, :, :0]
             base.a_hat = np.stack([found.action[found.k == k].mean(axis=0) for k in range(graph.count)])
-        first = drop if len(found) >= 2 * drop else 0
-        self.found = Starts(*(part[first:] for part in vars(states).values()))
-        self.own = Starts(*(part[:0] for part in vars(states).values()))
+        self.own = Starts(*(part[:0] for part in vars(self.found).values()))
         self.nets = ActorCritic(task.obs, task.actions, graph.count, c.width, c.rate, seed)
         self.policy = NetworkPolicy(
             base.M, base.a_hat, np.zeros(task.obs), np.ones(task.obs), np.array(c.sigma), self.nets.network()
