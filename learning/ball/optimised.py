@@ -49,8 +49,11 @@ class Optimised:
         """Of a stage: the arrays, and the state that it starts from; None where nothing was found."""
         if not len(self):
             return None
-        first = {f"states.{name}": getattr(self, name)[:1] for name in ("k", "joint_q", "joint_qd")}
-        return self.arrays | first
+        return self.arrays | {f"states.{name}": part for name, part in vars(self.starts(1)).items()}
+
+    def starts(self, worlds: int) -> Starts:
+        """Its first state, for each of some worlds."""
+        return Starts(*(np.repeat(x[:1], worlds, axis=0) for x in (self.k, self.joint_q, self.joint_qd)))
 
     @staticmethod
     def of(arrays: Arrays) -> Optimised:
@@ -95,10 +98,7 @@ def played(task: Arms, found: Optimised, fragments: int | None = None) -> tuple[
     """Play it back in all worlds of a task from its first state: for how many fragments (worlds,) nothing is
     lost, and the fingers' distance (fragments,) in the first world."""
     count = len(found) if fragments is None else fragments
-    starts = Starts(
-        *(np.repeat(x[:1], task.worlds, axis=0) for x in (found.k, found.joint_q, found.joint_qd))
-    )
-    rollout, fingers = Rollout(task, Playback(found), Ahead(), starts), []
+    rollout, fingers = Rollout(task, Playback(found), Ahead(), found.starts(task.worlds)), []
     stands, lived = np.ones(task.worlds, bool), np.zeros(task.worlds, int)
     for fragment in rollout.fragments(count):
         stands &= ~fragment.failed

@@ -27,7 +27,6 @@ from ..learning.evaluate.record import record
 from ..learning.graph import STEPS
 from ..learning.methods import ball as stage
 from ..learning.runs.stage import Context
-from ..learning.starts import Starts
 from ..learning.tasks.fingers import with_ready_hands
 from ..sims import Model
 from ..sims.ball.ball import BOUNCED, Ball, flights_of, inferred_ball, recorded_ball
@@ -109,8 +108,7 @@ def recover(model: Model, path: Path, limit: float) -> Recovered | None:
     if found is None:
         return compared(path.name, seconds, 0.0, true.path[:0], true.path[:0], model)
     task = stage.task(learner, 1)
-    starts = Starts(found.k[:1], found.joint_q[:1], found.joint_qd[:1])
-    seen = record(task, Playback(found), starts, len(found))[0]
+    seen = record(task, Playback(found), found.starts(1), len(found))[0]
     moved = seen.joint_q[:, model.q_slice(model.roles.one("ball_joint"))][:, :3]
     wanted = true.path[first : first + len(moved)]
     return compared(path.name, seconds, covered, moved[: len(wanted)], wanted, model)

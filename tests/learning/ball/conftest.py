@@ -3,7 +3,9 @@
 import pytest
 
 from warpdribble.learning import STAGES, Run
+from warpdribble.learning.methods.ball import BallConfig, make
 from warpdribble.learning.runs.folder import read_result
+from warpdribble.learning.runs.stage import Context
 from warpdribble.sims import Model
 from warpdribble.skills import read_skill, skill_graph
 
@@ -30,3 +32,20 @@ def needs():
 @pytest.fixture(scope="session")
 def legs():
     return Run.load(SKILL).learned(STAGES, "locomotion").controller
+
+
+@pytest.fixture(scope="session")
+def cycles():
+    """that `learner` finds"""
+    return 3
+
+
+@pytest.fixture(scope="session")
+def learner(dribbled, needs, cycles):
+    """Gauss-Newton steps that have found cycles of it, the states after each, and the reports."""
+    context = Context(dribbled, BallConfig(method="newton", cycles=cycles), needs=needs)
+    learner, states, reports = make(context), [], []
+    while not learner.done:
+        reports.append(learner.iterate())
+        states.append(learner.state)
+    return learner, states, reports

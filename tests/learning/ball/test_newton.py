@@ -8,12 +8,8 @@ from warpdribble.learning.ball.cycles import moved
 from warpdribble.learning.ball.newton import Newton, corrected, steps_down
 from warpdribble.learning.ball.optimised import Optimised, played
 from warpdribble.learning.ball.paper import Paper, PaperConfig
-from warpdribble.learning.methods.ball import BallConfig, make
-from warpdribble.learning.runs.stage import Context
 from warpdribble.learning.starts import Starts
 from warpdribble.learning.tasks.arms import Arms
-
-CYCLES = 3
 
 
 def test_the_moving_average():
@@ -63,34 +59,23 @@ def test_a_corrected_slope_has_the_step_right_and_nothing_else_changed(problem):
 # ------------------------------------------------------------------------------------ whole cycles
 
 
-@pytest.fixture(scope="module")
-def learner(dribbled, needs):
-    """Cycles of it, and the state after each but the last."""
-    context = Context(dribbled, BallConfig(method="newton", cycles=CYCLES), needs=needs)
-    learner, states, reports = make(context), [], []
-    while not learner.done:
-        reports.append(learner.iterate())
-        states.append(learner.state)
-    return learner, states, reports
-
-
-def test_what_is_found_plays_back_to_the_bit(learner, full, dribbled, legs):
+def test_what_is_found_plays_back_to_the_bit(learner, cycles, full, dribbled, legs):
     """In other worlds, from its first state alone, and nothing is lost."""
     found = Optimised.of(learner[0].result)
-    np.testing.assert_array_equal(found.k, (11 + np.arange(14 * CYCLES)) % 14)
+    np.testing.assert_array_equal(found.k, (11 + np.arange(14 * cycles)) % 14)
     task = Arms(full, dribbled, 16, legs)
     lived, fingers = played(task, found)
-    assert (lived == 14 * CYCLES).all()
+    assert (lived == 14 * cycles).all()
     np.testing.assert_array_equal(fingers, found.fingers)
     starts = Starts(*(learner[0].result[f"states.{name}"] for name in ("k", "joint_q", "joint_qd")))
     assert len(starts) == 1 and starts.k[0] == 11
 
 
-def test_fingers_are_near_the_ball_in_every_cycle(learner):
+def test_fingers_are_near_the_ball_in_every_cycle(learner, cycles):
     _, _, reports = learner
     assert all(report.found for report in reports) and reports[-1].fresh
     assert max(report.fingers for report in reports) < 2.0
-    assert [report.iteration for report in reports] == list(range(1, CYCLES + 1))
+    assert [report.iteration for report in reports] == list(range(1, cycles + 1))
 
 
 def test_only_hands_that_act_are_moved(learner, dribbled):
@@ -98,9 +83,9 @@ def test_only_hands_that_act_are_moved(learner, dribbled):
     assert (found.action[:, :10] == 0.0).all() and (found.action[:, 10:] != 0.0).any(axis=1).all()
 
 
-def test_gone_on_with_to_the_bit(learner, dribbled, legs):
+def test_gone_on_with_to_the_bit(learner, cycles):
     whole, states, _ = learner
-    other = Newton(*whole.tasks, whole.config, CYCLES)
+    other = Newton(*whole.tasks, whole.config, cycles)
     other.restore({name: np.array(value) for name, value in states[0].items()})
     while not other.done:
         other.iterate()
@@ -115,16 +100,16 @@ def test_a_state_of_another_graph_is_refused(learner):
 
 
 @pytest.mark.slow
-def test_cma_goes_on_to_the_bit_and_plays_back(learner, full, dribbled, legs):
+def test_cma_goes_on_to_the_bit_and_plays_back(learner, cycles, full, dribbled, legs):
     """From a window that is known already, P1's search finds two more; stopped between them, the same."""
     c = PaperConfig(near=0.02)
     task = Arms(full, dribbled, 32, legs, closely=True)
-    paper = Paper(task, c, CYCLES)
+    paper = Paper(task, c, cycles)
     paper.restore(learner[1][0])
     assert paper.iterate().found
     between = paper.state
     assert paper.iterate().found
-    other = Paper(task, c, CYCLES)
+    other = Paper(task, c, cycles)
     other.restore(between)
     other.iterate()
     for name, value in paper.state.items():
