@@ -6,10 +6,11 @@ how many there are.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
+
+from ..sims.worlds.cores import usable_cores
 
 T = TypeVar("T")
 
@@ -31,8 +32,8 @@ class Workers:
 
 
 def usual_workers(device: str) -> int:
-    """One for each processor core; on a GPU one."""
-    return (os.cpu_count() or 1) if device == "cpu" else 1
+    """One for each processor core that may be used; on a GPU one."""
+    return usable_cores() if device == "cpu" else 1
 
 
 def shares(count: int, workers: int) -> list[int]:

@@ -13,7 +13,6 @@ among workers, and whatever their number the result is the same."""
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -22,6 +21,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...sims.errors import InputError
+from ...sims.worlds.cores import usable_cores
 from ..choose import RandomWalk
 from ..evaluate.trials import Trials, record_starts, run_trials
 from ..policies.em import Moments, added, descendants, improve, select
@@ -355,7 +355,7 @@ def shared(context: Context, build: Callable[[int, int | None], T]) -> tuple[lis
     threads."""
     c: SamconConfig = context.config
     count = max(1, min(context.workers, c.islands))
-    threads = None if count == 1 else max(1, (os.cpu_count() or 1) // count)
+    threads = None if count == 1 else max(1, usable_cores() // count)
     tasks = [build(c.particles * islands, threads) for islands in shares(c.islands, count)]
     return tasks, [build(c.trials, threads) for _ in range(min(count, TRIED))]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import threading
 from collections.abc import Callable
@@ -16,6 +15,7 @@ import warp as wp
 
 from ... import kernels
 from ..model import Model
+from .cores import usable_cores
 from .state import QUANTITIES, Block, Layout
 
 RESPONSE_ROOM = 1130
@@ -83,7 +83,7 @@ class Batch:
         self._side_by_side = not on_cpu
         self._program = kernels.program(self.lanes)
         self.groups = -(-world_count // self.lanes)
-        self.threads = min(threads or (os.cpu_count() or 1), self.groups) if on_cpu else 1
+        self.threads = min(threads or usable_cores(), self.groups) if on_cpu else 1
         self._pool = ThreadPoolExecutor(max(1, self.threads - 1))
         self._tree = self._make_tree()
         self._tree_version = 0
