@@ -28,7 +28,8 @@ from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
 from ..runs.stage import Arrays, Context, Report, Stage
 from ..starts import Starts, Streams
-from ..tasks.arms import RESTITUTION, STATES, Arms, BallWeights, misplaced
+from ..tasks.arms import STATES, Arms, BallWeights, misplaced
+from ..tasks.balls import Balls
 from ..tasks.disturbance import Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
@@ -62,17 +63,22 @@ class PpoConfig:
     sigma: float = 0.04
     """[rad] exploration at first"""
     base: str = "linear"
-    """what the network adds to: "linear", P1's regression; "offsets", the mean action of each fragment"""
+    """what the network adds to: "linear", P1's regression; "offsets", the mean action of each fragment; or
+    "nothing\""""
     state: str = "full"
     """what the policy feels, one of `tasks.arms.STATES`"""
     speed_noise: float = 0.15
     """[rad/s, m/s] standard deviation of what is added to all joint velocities at a start, the ball's too"""
     place_noise: float = 0.01
     """[m] of how far off the ball is"""
-    restitution: float = 0.05
-    """that of ball and ground is drawn for each world from so far around the model's"""
+    restitution: float = 0.12
+    """Each world has a ball of its own; that of ball and ground is drawn from so far around the model's"""
+    mass: float = 0.3
+    """and its mass from so large a share"""
+    sensor_noise: float = 0.05
+    """standard deviation of what is added to what is felt, in units of the state"""
     disturbance: Disturbance = field(default=Disturbance(push=150.0))
-    """pushes grow with the noise of starts"""
+    """pushes, and what balls differ by, grow with the noise of starts"""
     enough: float = 0.99
     """share of the trials to survive, from starts as disturbed as they shall be, after which it is done"""
     episode: int = 200
@@ -90,7 +96,7 @@ class PpoConfig:
     cost: BallWeights = field(default=BallWeights())
 
 
-BASES = ("linear", "offsets")
+BASES = ("linear", "offsets", "nothing")
 EASY, HARDER, FEW = 0.2, 1.03, 0.02
 """Starts are disturbed by so much at first, and by so much more each time that fewer fragments fail."""
 POOL = 2048
@@ -129,11 +135,18 @@ class Progress(Report):
 class Drawn:
     """The policy's actions with exploration, as they were drawn last."""
 
-    def __init__(self, policy: NetworkPolicy, log_sigma: np.ndarray, random: np.random.Generator):
-        self.policy, self.log_sigma, self.random = policy, log_sigma, random
+    def __init__(
+        self, policy: NetworkPolicy, log_sigma: np.ndarray, random: np.random.Generator, sensors: float
+    ):
+        self.policy, self.log_sigma, self.random, self.sensors = policy, log_sigma, random, sensors
         self.sigma = np.exp(log_sigma)
 
+    def felt(self, s: np.ndarray) -> np.ndarray:
+        """States as they are felt."""
+        return s + self.sensors * self.random.standard_normal(s.shape, np.float32)
+
     def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
+        s = self.felt(s)
         self.x = self.policy.felt(s)
         self.mean = self.policy.network(self.x, k)
         self.noise = self.random.standard_normal(self.mean.shape, np.float32)
@@ -149,8 +162,9 @@ class Ppo:
         from ..policies.actor_critic import ActorCritic  # torch, which only learning needs
 
         base, self.found = begun(task, found, c.drop, c.first_ridge, c.sigma)
+        if c.base != "linear":
+            base.M, base.a_hat = base.M[:, :, :0], np.zeros_like(base.a_hat)
         if c.base == "offsets":
-            base.M = base.M[:, :, :0]
             base.a_hat = np.stack([found.action[found.k == k].mean(axis=0) for k in range(graph.count)])
         self.own = Starts(*(part[:0] for part in vars(self.found).values()))
         self.nets = ActorCritic(task.obs, task.actions, graph.count, c.width, c.rate, seed)
@@ -167,10 +181,10 @@ class Ppo:
         self.disturber = Disturber(c.disturbance, Streams([random], task.worlds))
         start = self._starts(random, task.worlds)
         self.rollout = Rollout(task, self._drawn(random), self._walk(random), start, self.disturber)
-        if c.restitution:
-            ball = task.model.roles.one("ball")
-            spread = RESTITUTION + c.restitution * random.uniform(-1.0, 1.0, task.worlds)
-            task.sim.set_contact(ball, "ground", restitution=spread)
+        self.spread = random.uniform(-1.0, 1.0, (task.worlds, 2))
+        """(worlds, 2) where in its range what each world's ball has is"""
+        self.balls = Balls(c.restitution, c.mass)
+        self.balls.put(trial_task, 1.0, random.uniform(-1.0, 1.0, (trial_task.worlds, 2)))
         self._beside = ThreadPoolExecutor(1)
 
     @property
@@ -178,7 +192,7 @@ class Ppo:
         return self.iteration >= self.config.iterations or self._enough
 
     def _drawn(self, random: np.random.Generator) -> Drawn:
-        return Drawn(self.policy, self.nets.log_sigma(), random)
+        return Drawn(self.policy, self.nets.log_sigma(), random, self.config.sensor_noise)
 
     def _walk(self, random: np.random.Generator) -> RandomWalk:
         return RandomWalk(Streams([random], self.task.worlds))
@@ -238,6 +252,7 @@ class Ppo:
         self.rollout.controller, self.rollout.chooser = drawn, self._walk(random)
         self.disturber.streams = Streams([random], task.worlds)
         self.disturber.what = replace(c.disturbance, push=self.hardness * c.disturbance.push)
+        self.balls.put(task, self.hardness, self.spread)
         shape = (c.steps, task.worlds)
         x = np.empty((c.steps + 1, task.worlds, task.obs), np.float32)
         k = np.empty((c.steps + 1, task.worlds), int)
@@ -251,7 +266,7 @@ class Ppo:
             over = failed.copy()
             if t == c.steps - 1:
                 k[-1] = self.rollout.chooser.next(graph, fragment.k)
-                x[-1] = self.policy.felt(task.observe(k[-1]))
+                x[-1] = self.policy.felt(drawn.felt(task.observe(k[-1])))
                 self._keep(random, k[-1], failed)
                 over |= self.age >= c.episode
             if over.any():

@@ -8,22 +8,16 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from warpdribble.learning import STAGES, Run, run_trials  # noqa: E402
+from warpdribble.learning import STAGES, run_trials  # noqa: E402
 from warpdribble.learning.ball.optimised import Optimised  # noqa: E402
-from warpdribble.learning.choose import Ahead  # noqa: E402
 from warpdribble.learning.methods import ppo  # noqa: E402
 from warpdribble.learning.methods.ppo import Ppo, PpoConfig  # noqa: E402
 from warpdribble.learning.policies.actor_critic import ActorCritic, through  # noqa: E402
 from warpdribble.learning.policies.batch import Batch, advantages  # noqa: E402
 from warpdribble.learning.policies.network import NetworkPolicy  # noqa: E402
-from warpdribble.learning.rollout import Rollout  # noqa: E402
-from warpdribble.learning.runs.folder import read_result  # noqa: E402
-from warpdribble.learning.runs.stage import Context  # noqa: E402
 from warpdribble.learning.starts import Starts  # noqa: E402
 from warpdribble.sims.errors import InputError  # noqa: E402
-from warpdribble.skills import read_skill, skill_graph  # noqa: E402
 
-SKILL = "dribble-right-authored"
 SMALL = PpoConfig(
     iterations=4, worlds=32, steps=4, epochs=2, minibatch=64, width=16, trials=16, check_every=2,
     check_seconds=0.35, episode=9, drop=1,
@@ -31,28 +25,8 @@ SMALL = PpoConfig(
 
 
 @pytest.fixture(scope="module")
-def context():
-    """Of the shipped dribble; in place of what trajectory optimisation finds, two cycles that the shipped
-    policy goes through."""
-    run = Run.load(SKILL)
-    one = run.learned(STAGES, "policy")
-    task = one.task(1)
-    start = Starts(*(part[:1] for part in vars(one.starts).values()))
-    rollout = Rollout(task, one.controller, Ahead(), start)
-    rows = {name: [] for name in ("k", "action", "joint_q", "joint_qd", "fingers")}
-    for k, q, qd in [(start.k[0], start.joint_q[0], start.joint_qd[0])]:
-        before = (k, q, qd)
-    for fragment in rollout.fragments(28):
-        rows["k"].append(fragment.k[0])
-        rows["action"].append(fragment.action[0])
-        rows["joint_q"].append(before[1])
-        rows["joint_qd"].append(before[2])
-        rows["fingers"].append(task.fingers[0])
-        before = (None, np.array(task.sim.joint_q[0]), np.array(task.sim.joint_qd[0]))
-        assert not fragment.failed.any()
-    found = Optimised(**{name: np.array(values) for name, values in rows.items()})
-    needs = {"locomotion": read_result(run.folder / "locomotion"), "ball": found.result}
-    return Context(skill_graph(read_skill(SKILL))[0], SMALL, seed=3, needs=needs)
+def context(dribbled):
+    return replace(dribbled, config=SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -193,6 +167,19 @@ def test_a_state_of_another_network_is_refused(learned, context):
 def test_unknown_names_are_refused(context, wrong):
     with pytest.raises(InputError, match="there is no"):
         ppo.make(replace(context, config=replace(SMALL, **wrong)))
+
+
+def test_bases(context):
+    """What is done before anything is learned: P1's regression, its mean, nothing."""
+    found = Optimised.of(context.needs["ball"])
+    k = np.arange(context.graph.count)
+    for base in ppo.BASES:
+        policy = ppo.make(replace(context, config=replace(SMALL, base=base))).policy
+        assert policy.M.shape[2] == (76 if base == "linear" else 0)
+        done = policy.base(np.zeros((len(k), 76)), k)
+        if base == "offsets":
+            np.testing.assert_allclose(done[0], found.action[found.k == 0].mean(axis=0))
+        assert done.any() == (base != "nothing")
 
 
 def test_a_learner_needs_no_ppo_to_be_shown():
