@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from ..runs.stage import Stage
-from . import linear, ppo, samcon
+from . import ddpg, linear, ppo, samcon
 from .ball import STAGE as BALL
 
 STAGES: dict[str, Stage] = {
     "locomotion": samcon.STAGE,
     "ball": BALL,
     "linear": linear.STAGE,
+    "ddpg": ddpg.STAGE,
     "policy": ppo.STAGE,
 }
 """What can be learned, in the order in which one stands on the other."""
