@@ -17,7 +17,7 @@ not been.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -306,6 +306,26 @@ def _alike(default: Any, value: Any, name: str) -> Any:
         said = {int: "whole number", float: "number", bool: "true or false", str: "text"}
         raise TypeError(f"{name} is no {said.get(kind, kind.__name__)}")
     return value
+
+
+def changed(config: Any, asked: Sequence[str]) -> Any:
+    """A dataclass with other values, each as "name=value" or "name.name=value", the value as JSON has it or
+    plain text. Raises InputError for a name that it lacks, and for a value of another kind."""
+    for one in asked:
+        name, there, text = one.partition("=")
+        if not there:
+            raise InputError(f"'{one}' is no NAME=VALUE", hint="set")
+        try:
+            value = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        for key in reversed(name.split(".")):
+            value = {key: value}
+        try:
+            config = filled(config, value)
+        except TypeError as error:
+            raise InputError(f"'{one}': {error}", hint="set") from None
+    return config
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:

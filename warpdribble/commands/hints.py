@@ -25,6 +25,7 @@ HINTS = {
     "contact": "say who has it when under [contact] in the skill's file",
     "method": "give another --method",
     "seed": "try another --seed",
+    "set": "give another --set; the stage's config.json has the names",
 }
 """Hint -> what it means here, for `sims.errors.InputError`."""
 

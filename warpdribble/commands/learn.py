@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,10 +34,13 @@ class Learn:
     """Of a clip: its ends are made to meet."""
     stage: str = ""
     """What to learn: locomotion, to stay up and follow the motion without the ball; ball, cycle after cycle
-    of arms and fingers that keep it; policy, a network that keeps it for good, or linear, the paper's simpler
-    policy. When empty, all that the skill needs: locomotion, and where there is a ball, ball and policy."""
+    of arms and fingers that keep it; policy, a network that keeps it for good, or one of the paper's, linear
+    and ddpg. When empty, all that the skill needs: locomotion, and where there is a ball, ball and policy."""
     method: str = ""
     """How the stage ball finds its cycles: usual, newton, smc or paper (docs/dribbling.md)."""
+    set: tuple[str, ...] = ()
+    """Parameters of the stage that is named, other than the usual: NAME=VALUE as in its config.json, with
+    dots for what lies deeper, as in cost.change=0.4."""
     seed: int = 0
     """Of everything random; the same seed gives the same policy."""
     iterations: int | None = None
@@ -70,6 +73,10 @@ class Learn:
             raise ValueError(f"--iterations {self.iterations}: of which stage? name it with --stage")
         if self.method and self.stage not in ("", "ball"):
             raise ValueError(f"--method {self.method}: it is for the stage ball")
+        if self.set and not self.stage:
+            raise ValueError(f"--set {self.set[0]}: of which stage? name it with --stage")
+        if self.stage:
+            self._config(STAGES[self.stage])  # said before there is a folder
         one = self._skill()
         find_device(self.device)
         run = Run.begin(self.out, skill_fields(one), self.seed)
@@ -165,7 +172,12 @@ class Learn:
     def _config(self, stage: Stage) -> Any:
         """The parameters that were asked for; None for the usual ones, or those that the stage was begun
         with."""
-        return replace(stage.config(), method=self.method) if self.method and stage.name == "ball" else None
+        from ..learning.runs.folder import changed
+
+        asked = list(self.set)
+        if self.method and stage.name == "ball":
+            asked.append(f"method={self.method}")
+        return changed(stage.config(), asked) if asked else None
 
     def _next(self, run: Run) -> None:
         """What may be done with it."""

@@ -9,10 +9,12 @@ import pytest
 
 from tests.learning.runs.walker import SKILL, STAGE, Steps, WalkerConfig, arrays, assert_same, walk
 from warpdribble.learning.methods import STAGES
+from warpdribble.learning.methods.ddpg import DdpgConfig
+from warpdribble.learning.methods.ppo import PpoConfig
 from warpdribble.learning.methods.samcon import SamconConfig
 from warpdribble.learning.policies.linear import LinearPolicy
 from warpdribble.learning.runs import folder as runs
-from warpdribble.learning.runs.folder import Run, filled, plain, shipped_controllers
+from warpdribble.learning.runs.folder import Run, changed, filled, plain, shipped_controllers
 from warpdribble.sims.errors import InputError
 
 WALKER = {"walker": STAGE}
@@ -176,6 +178,33 @@ def test_parameters_that_are_none_are_said(own, values, said):
 def test_whole_numbers_pass_for_numbers():
     assert filled(WalkerConfig(), {"steps": {"size": 2}}) == WalkerConfig(steps=Steps(size=2.0))
     assert type(filled(WalkerConfig(), {"steps": {"size": 2}}).steps.size) is float
+
+
+def test_parameters_are_changed_by_name():
+    """Deeper ones too, and nothing else; what is no JSON is text."""
+    asked = ["cost.change=0.4", "sigma=1", "base=offsets"]
+    config = changed(PpoConfig(), asked)
+    assert config == replace(
+        PpoConfig(), cost=replace(PpoConfig().cost, change=0.4), sigma=1.0, base="offsets"
+    )
+    assert changed(DdpgConfig(), ["critic=[30, 40]"]).critic == (30, 40)
+    assert type(config.sigma) is float and changed(config, []) is config
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("speed=3", "'speed=3': unknown key 'speed'"),
+        ("cost.speed.x=3", "'cost.speed.x=3': speed is no number"),
+        ("sigma=much", "'sigma=much': sigma is no number"),
+        ("base", "'base' is no NAME=VALUE"),
+        ("cost=3", "'cost=3': cost is no table"),
+    ],
+)
+def test_parameters_that_cannot_be_changed(asked, said):
+    with pytest.raises(InputError) as error:
+        changed(PpoConfig(), [asked])
+    assert str(error.value) == said and error.value.hint == "set"
 
 
 def test_every_stage_s_parameters_come_back():

@@ -11,7 +11,7 @@ from warpdribble.commands.hints import HINTS, one_line
 from warpdribble.learning.methods import STAGES
 from warpdribble.learning.methods.samcon import SamconConfig
 from warpdribble.learning.runs import files
-from warpdribble.learning.runs.folder import Run
+from warpdribble.learning.runs.folder import Run, changed
 from warpdribble.learning.runs.train import train
 from warpdribble.sims import Model
 from warpdribble.sims.errors import InputError
@@ -115,6 +115,10 @@ WRONG = {
         "let it go on with the same warpdribble learn",
     ),
     "no stage": (lambda a: a.run.learned(STAGES, "flying"), "give another --stage"),
+    "no parameter": (
+        lambda a: changed(SamconConfig(), ["speed=3"]),
+        "give another --set; the stage's config.json has the names",
+    ),
     "held": (lambda a: a.twice(), "give another --out"),
     "no arrays": (lambda a: files.read_arrays(a.write("a.npz", "PK"), "delete it"), ""),
     "another buffer": (lambda a: (a.mapped(2), a.mapped(3)), "give another --out"),

@@ -198,6 +198,11 @@ def test_an_export_with_a_skin_and_a_fall(run, capsys, tmp_path):
         (("--data", "nowhere"), "--data nowhere: no such folder"),
         (("--stage", "flying"), "--stage flying: give one of locomotion"),
         (("--workers", "0"), "--workers 0: give a number from 1"),
+        (("--set", "sigma=0.1"), "--set sigma=0.1: of which stage? name it with --stage"),
+        (
+            ("--stage", "locomotion", "--set", "height=3"),
+            "'height=3': unknown key 'height'; give another --set",
+        ),
     ],
 )
 def test_what_cannot_be_learned_with(capsys, tmp_path, arguments, said):
