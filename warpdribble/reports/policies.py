@@ -15,10 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from ..learning.ball.smc import Smc, SmcConfig
 from ..learning.evaluate.trials import Trials, run_trials
 from ..learning.methods import STAGES, needed
+from ..learning.methods.ball import STAGE as BALL
+from ..learning.methods.ball import BallConfig, arms
 from ..learning.runs.folder import RESULT, RUN, Run, read_result
 from ..learning.runs.log import read_rows
+from ..learning.starts import Starts, Streams
 from .markers import check_page, write_measured
 
 TRIALS = 64
@@ -26,6 +30,8 @@ CYCLES, FEW = 1000, 100
 """that a trial lasts: from the policy's own way, and from there with noise"""
 NOISE = 0.15
 """[rad/s, m/s]"""
+PARTICLES, SEEDS, TRIES = 1024, 3, 4
+"""of the search that a start is beyond rescue for, if it does not keep the ball for a cycle either"""
 MEASURED = "measured-policy.json"
 PUBLISHED = {
     "carry": 1.1 + 0.8,
@@ -49,6 +55,8 @@ def measure(folder: Path) -> Measured:
     task = one.task(TRIALS)
     calm = run_trials(task, one.controller, one.starts, CYCLES, 1)
     noisy = run_trials(task, one.controller, one.starts, FEW, 2, NOISE)
+    starts = one.starts.draw(Streams([np.random.default_rng(2)], TRIALS), NOISE)  # those of `noisy`
+    lost = Starts(*(part[~noisy.survived] for part in vars(starts).values()))
     rows = read_rows(folder / "policy")
     seen: Measured = {
         "stamp": stamp,
@@ -61,9 +69,23 @@ def measure(folder: Path) -> Measured:
         "hardness": rows[-1]["hardness"],
         "calm": _counts(calm, CYCLES),
         "noisy": _counts(noisy, FEW),
+        "beyond": sum(not rescued(run, lost, i) for i in range(len(lost))),
     }
     kept.write_text(json.dumps(seen, indent=2))
     return seen
+
+
+def rescued(run: Run, starts: Starts, which: int) -> bool:
+    """Whether a search with many particles, from one of some states, keeps the ball for a cycle."""
+    context = run.context(BALL, BallConfig())
+    begin = Starts(*(part[which : which + 1] for part in vars(starts).values()))
+    for seed in range(SEEDS):
+        search = Smc(arms(context, PARTICLES), SmcConfig(PARTICLES), 1, TRIES, begin, seed)
+        while not search.done:
+            search.iterate()
+        if search.found_cycles:
+            return True
+    return False
 
 
 def _seconds(folder: Path) -> float:
@@ -91,11 +113,12 @@ def table(runs: list[Measured]) -> str:
     lines = [
         f"Of {TRIALS} trials, each from a random state on the policy's way: how many last {CYCLES} cycles; "
         f"and from starts with noise of {NOISE:g} rad/s on all joint speeds (root and ball: m/s), how many "
-        f"last {FEW} cycles, and how many of the rest are lost within the first.",
+        f"last {FEW} cycles, how many of the rest are lost within the first, and from how many of them "
+        f"a search with {PARTICLES} particles ({TRIES} times, {SEEDS} seeds) does not keep the ball either.",
         "",
         "| skill | seed | legs [s] | ball [s] | policy [s] | together [min] | P1 [h] "
-        "| last 1000 cycles | noisy | lost at once |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| last 1000 cycles | noisy | lost at once | beyond rescue |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for run in runs:
         seconds, skill = run["seconds"], run["skill"]
@@ -108,6 +131,7 @@ def table(runs: list[Measured]) -> str:
             str(run["calm"]["survived"]),
             str(run["noisy"]["survived"]),
             str(run["noisy"]["early"]),
+            str(run["beyond"]),
         ]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
