@@ -74,6 +74,10 @@ class Starts:
         each = Starts(self.k[pick], self.joint_q[pick], self.joint_qd[pick] + noise)
         return Starts(*(streams.worlds(part) for part in vars(each).values()))
 
+    def __getitem__(self, which: np.ndarray | slice | list[int]) -> Starts:
+        """Some of them: rows, a slice, or a mask (n,)."""
+        return Starts(*(part[which] for part in vars(self).values()))
+
     @staticmethod
     def joined(parts: Sequence[Starts]) -> Starts:
         """All of them, one after the other."""

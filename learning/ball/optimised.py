@@ -122,7 +122,7 @@ def observed(task: Arms, starts: Starts) -> np.ndarray:
     out = []
     for first in range(0, len(starts), task.worlds):
         rows = np.minimum(np.arange(first, first + task.worlds), len(starts) - 1)
-        some = Starts(*(part[rows] for part in vars(starts).values()))
+        some = starts[rows]
         task.reset(some)
         out.append(task.observe(some.k))
     return np.concatenate(out)[: len(starts)]

@@ -29,6 +29,7 @@ from ..choose import RandomWalk
 from ..evaluate.trials import record_starts, run_trials
 from ..policies.bounded import PHASES, BoundedPolicy, phase_table
 from ..policies.linear import LinearPolicy
+from ..policies.noisy import Noisy
 from ..policies.replay import Replay
 from ..rollout import Controller, Fragment, Rollout
 from ..runs.stage import Arrays, Context, Report, Stage
@@ -150,21 +151,6 @@ class Progress(Report):
 
     count: int = 10_000
     """transitions of this iteration"""
-
-
-@dataclass
-class Noisy:
-    """A controller with exploration; or, without any, nothing else."""
-
-    controller: Controller | None
-    noise: float
-    active: np.ndarray
-    random: np.random.Generator
-
-    def act(self, s: np.ndarray, k: np.ndarray) -> np.ndarray:
-        noise = self.noise * self.random.standard_normal((len(k), self.active.shape[1]))
-        wanted = noise if self.controller is None else self.controller.act(s, k) + noise
-        return np.where(self.active[k], wanted, 0.0)
 
 
 class Ddpg:

@@ -81,7 +81,7 @@ def begun(
     states, drop = states_of(task, found), cycles * task.graph.cycle
     policy = regressed(found, observed(task, states), task.graph.count, drop, ridge, sigma)
     first = drop if len(found) >= 2 * drop else 0
-    return policy, Starts(*(part[first:] for part in vars(states).values()))
+    return policy, states[first:]
 
 
 class Linear(Samcon):

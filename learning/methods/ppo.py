@@ -166,7 +166,7 @@ class Ppo:
             base.M, base.a_hat = base.M[:, :, :0], np.zeros_like(base.a_hat)
         if c.base == "offsets":
             base.a_hat = np.stack([found.action[found.k == k].mean(axis=0) for k in range(graph.count)])
-        self.own = Starts(*(part[:0] for part in vars(self.found).values()))
+        self.own = self.found[:0]
         self.nets = ActorCritic(task.obs, task.actions, graph.count, c.width, c.rate, seed)
         self.policy = NetworkPolicy(
             base.M, base.a_hat, np.zeros(task.obs), np.ones(task.obs), np.array(c.sigma), self.nets.network()
@@ -280,7 +280,7 @@ class Ppo:
         if len(settled):
             which = random.permutation(settled)[:KEPT]
             own = Starts.joined([self.own, self.task.states(k[which], which)])
-            self.own = Starts(*(part[-POOL:] for part in vars(own).values()))
+            self.own = own[-POOL:]
 
     def _normalise(self, batch: Batch) -> None:
         """The state is in units of the first batch."""

@@ -145,7 +145,7 @@ class ActorQ:
 
     # ------------------------------------------------------------------------------------------ networks
 
-    def act(self, net: Weights, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    def actions(self, net: Weights, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Of states x (n, inputs): what the hidden layer adds up (n, H), what the last does before its bounds
         (n, actions), and the actions (Eq. 18, 19)."""
         z = torch.addmm(net.of["c1"], x, net.of["V1"])
@@ -187,7 +187,7 @@ class ActorQ:
         self, r: torch.Tensor, after: torch.Tensor, goes_on: torch.Tensor, active: torch.Tensor, gamma: float
     ) -> torch.Tensor:
         """y (n,) of Eq. 13."""
-        then = self.act(self.actor_target, after)[2] * active
+        then = self.actions(self.actor_target, after)[2] * active
         return r + gamma * goes_on * self.value(self.critic_target, after, then)[2][:, 0]
 
     def improve_critic(self, x: torch.Tensor, a: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
@@ -209,7 +209,7 @@ class ActorQ:
     def improve_actor(self, x: torch.Tensor, active: torch.Tensor, rectify: bool) -> None:
         """The gradient of Eq. 16, its sign turned, as optimisers descend; rectify: Eq. 20."""
         w, g, q = self.actor.of, self.actor.grad, self.critic.of
-        z, u, a = self.act(self.actor, x)
+        z, u, a = self.actions(self.actor, x)
         z2 = self.value(self.critic, x, a * active)[1]
         up = back(q["w3"].T.expand(len(x), -1), z2, self.slope, False) @ q["Wa"].T
         if rectify:

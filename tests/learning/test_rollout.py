@@ -260,9 +260,9 @@ def test_copies_go_on_as_their_originals(learned):
 def test_who_begins_anew_does_so_as_in_new_worlds(learned):
     """And leaves the others as they are, to the bit."""
     task, states = learned.task(4), learned.starts
-    some, which = Starts(*(part[[5, 9]] for part in vars(states).values())), np.array([0, 1, 0, 1], bool)
+    some, which = states[[5, 9]], np.array([0, 1, 0, 1], bool)
     alone = Rollout(learned.task(2), learned.controller, Ahead(), some)
-    begin = Starts(*(part[:4] for part in vars(states).values()))
+    begin = states[:4]
     undisturbed = Rollout(learned.task(4), learned.controller, Ahead(), begin)
     rollout = Rollout(task, learned.controller, Ahead(), begin)
     for fragment in rollout.fragments(8):
@@ -324,10 +324,11 @@ def loops(path):
 
 
 def test_nothing_else_acts_and_advances():
-    """Whoever wants a closed loop folds over a `Rollout`; legs that go along act within a fragment."""
+    """Whoever wants a closed loop folds over a `Rollout`; legs that go along act within a fragment, and a
+    policy with exploration does what another does and something beside it."""
     loop = ROOT / "learning" / "rollout.py"
     assert {call for _, call in loops(loop)} == {"self.controller.act", "self.task.advance"}
     for folder in ("learning", "warpdribble"):
         for path in (ROOT / folder).rglob("*.py"):
-            found = {call for _, call in loops(path)} - {"self.legs.act"}
+            found = {call for _, call in loops(path)} - {"self.legs.act", "self.policy.act"}
             assert path == loop or not found, path.relative_to(ROOT)

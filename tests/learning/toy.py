@@ -65,7 +65,7 @@ class RandomSearch:
         tried = self.arms + c.sigma * random.standard_normal((c.candidates, *self.arms.shape))
         tried[0] = self.arms
         same = np.zeros(c.candidates, int)
-        start = Starts(*(part[same] for part in vars(self.starts).values()))
+        start = self.starts[same]
         rollout = Rollout(self.task, LegsAndArms(self.context, tried), Ahead(), start)
         cost = np.mean([fragment.cost for fragment in rollout.fragments(c.walk)], axis=0)
         self.arms, self.cost = tried[np.argmin(cost)], float(cost.min())

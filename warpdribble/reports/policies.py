@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from ..learning.ball.smc import Smc, SmcConfig
+from ..learning.choose import Ahead
 from ..learning.evaluate.trials import Trials, run_trials
 from ..learning.methods import STAGES, needed
-from ..learning.methods.ball import STAGE as BALL
-from ..learning.methods.ball import BallConfig, arms
-from ..learning.runs.folder import RESULT, RUN, Run, read_result
+from ..learning.policies.em import select
+from ..learning.policies.noisy import Noisy
+from ..learning.rollout import Rollout
+from ..learning.runs.folder import RESULT, RUN, Learned, Run, read_result
 from ..learning.runs.log import read_rows
 from ..learning.starts import Starts, Streams
+from ..learning.tasks.arms import Arms
 from .markers import check_page, write_measured
 
 TRIALS = 64
@@ -30,8 +32,9 @@ CYCLES, FEW = 1000, 100
 """that a trial lasts: from the policy's own way, and from there with noise"""
 NOISE = 0.15
 """[rad/s, m/s]"""
-PARTICLES, SEEDS, TRIES = 1024, 3, 4
-"""of the search that a start is beyond rescue for, if it does not keep the ball for a cycle either"""
+PARTICLES, SEEDS, KEEP, SIGMA = 1024, 3, 0.5, 0.15
+"""of the search that a start is beyond rescue for: worlds, how often it is tried, the share that has
+children, exploration [rad]"""
 MEASURED = "measured-policy.json"
 PUBLISHED = {
     "carry": 1.1 + 0.8,
@@ -56,7 +59,7 @@ def measure(folder: Path) -> Measured:
     calm = run_trials(task, one.controller, one.starts, CYCLES, 1)
     noisy = run_trials(task, one.controller, one.starts, FEW, 2, NOISE)
     starts = one.starts.draw(Streams([np.random.default_rng(2)], TRIALS), NOISE)  # those of `noisy`
-    lost = Starts(*(part[~noisy.survived] for part in vars(starts).values()))
+    lost = starts[~noisy.survived]
     rows = read_rows(folder / "policy")
     seen: Measured = {
         "stamp": stamp,
@@ -69,21 +72,27 @@ def measure(folder: Path) -> Measured:
         "hardness": rows[-1]["hardness"],
         "calm": _counts(calm, CYCLES),
         "noisy": _counts(noisy, FEW),
-        "beyond": sum(not rescued(run, lost, i) for i in range(len(lost))),
+        "beyond": sum(not rescued(one, lost[[i]]) for i in range(len(lost))),
     }
     kept.write_text(json.dumps(seen, indent=2))
     return seen
 
 
-def rescued(run: Run, starts: Starts, which: int) -> bool:
-    """Whether a search with many particles, from one of some states, keeps the ball for a cycle."""
-    context = run.context(BALL, BallConfig())
-    begin = Starts(*(part[which : which + 1] for part in vars(starts).values()))
+def rescued(one: Learned, start: Starts) -> bool:
+    """Whether a search keeps the ball from a state for two cycles: particles that do what the policy does and
+    something beside it, of which the better have children after every fragment."""
+    task = one.task(PARTICLES)
+    assert isinstance(task, Arms)
+    each = start[np.zeros(PARTICLES, int)]
     for seed in range(SEEDS):
-        search = Smc(arms(context, PARTICLES), SmcConfig(PARTICLES), 1, TRIES, begin, seed)
-        while not search.done:
-            search.iterate()
-        if search.found_cycles:
+        who = Noisy(one.controller, SIGMA, task.active, np.random.default_rng(seed))
+        rollout = Rollout(task, who, Ahead(), each)
+        for fragment in rollout.fragments(2 * task.graph.cycle):
+            parent, lost = select(fragment.cost[None], KEEP)
+            if lost[0]:
+                break
+            rollout.become(parent[0])
+        else:
             return True
     return False
 
@@ -114,7 +123,7 @@ def table(runs: list[Measured]) -> str:
         f"Of {TRIALS} trials, each from a random state on the policy's way: how many last {CYCLES} cycles; "
         f"and from starts with noise of {NOISE:g} rad/s on all joint speeds (root and ball: m/s), how many "
         f"last {FEW} cycles, how many of the rest are lost within the first, and from how many of them "
-        f"a search with {PARTICLES} particles ({TRIES} times, {SEEDS} seeds) does not keep the ball either.",
+        f"a search with {PARTICLES} particles keeps the ball for two cycles in none of {SEEDS} tries.",
         "",
         "| skill | seed | legs [s] | ball [s] | policy [s] | together [min] | P1 [h] "
         "| last 1000 cycles | noisy | lost at once | beyond rescue |",

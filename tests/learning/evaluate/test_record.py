@@ -11,7 +11,7 @@ from warpdribble.learning.graph import STEPS, joined
 from warpdribble.learning.methods import STAGES
 from warpdribble.learning.rollout import Rollout
 from warpdribble.learning.runs.folder import Run
-from warpdribble.learning.starts import Starts, Streams, reference_starts
+from warpdribble.learning.starts import Streams, reference_starts
 from warpdribble.learning.tasks.disturbance import Disturbance, Disturber
 from warpdribble.learning.tasks.follow import OpenLoop
 from warpdribble.sims.planar import composed, planar, relative
@@ -103,7 +103,7 @@ def test_between_fragments_the_reference_is_the_graph_s(player, graph, task):
     """Moved and turned over the ground and nothing else, over a branch too."""
     both = joined([graph, graph], [((0, 3), (1, 4)), ((1, 13), (0, 0))])
     begin = reference_starts(both)
-    begin = Starts(*(part[2:3] for part in vars(begin).values()))
+    begin = begin[2:3]
     worlds = task(1, graph=both)
 
     class Over:

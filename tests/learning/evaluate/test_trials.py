@@ -275,7 +275,7 @@ def test_states_that_a_policy_lives_on_from(task, graph):
     )
     trials = run_trials(worlds, open_loop(worlds), states, 1)
     assert trials.survived.all()
-    worlds.reset(Starts(*(part[:8] for part in vars(states).values())))
+    worlds.reset(states[:8])
     away = np.abs(worlds.observe(states.k[:8]))
     others = np.abs(worlds.observe((states.k[:8] + 7) % graph.count))
     assert away.mean() < others.mean()  # of the reference where it says it is, and half a cycle from there

@@ -9,7 +9,6 @@ from warpdribble.learning.choose import Ahead
 from warpdribble.learning.rollout import Rollout
 from warpdribble.learning.runs.folder import read_result
 from warpdribble.learning.runs.stage import Context
-from warpdribble.learning.starts import Starts
 from warpdribble.skills import read_skill, skill_graph
 
 SKILL = "dribble-right-authored"
@@ -22,7 +21,7 @@ def dribbled():
     run = Run.load(SKILL)
     one = run.learned(STAGES, "policy")
     task = one.task(1)
-    start = Starts(*(part[:1] for part in vars(one.starts).values()))
+    start = one.starts[:1]
     rollout = Rollout(task, one.controller, Ahead(), start)
     rows = {name: [] for name in ("k", "action", "joint_q", "joint_qd", "fingers")}
     before = (start.joint_q[0], start.joint_qd[0])

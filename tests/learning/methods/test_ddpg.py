@@ -10,8 +10,9 @@ torch = pytest.importorskip("torch")
 
 from warpdribble.learning import STAGES  # noqa: E402
 from warpdribble.learning.methods import ddpg  # noqa: E402
-from warpdribble.learning.methods.ddpg import DdpgConfig, Noisy, Reward  # noqa: E402
+from warpdribble.learning.methods.ddpg import DdpgConfig, Reward  # noqa: E402
 from warpdribble.learning.policies.bounded import BoundedPolicy  # noqa: E402
+from warpdribble.learning.policies.noisy import Noisy  # noqa: E402
 from warpdribble.learning.policies.replay import Replay  # noqa: E402
 from warpdribble.learning.rollout import Fragment  # noqa: E402
 from warpdribble.sims.errors import InputError  # noqa: E402

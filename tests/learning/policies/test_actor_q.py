@@ -172,7 +172,7 @@ def test_it_learns_what_an_action_is_worth():
         r = -((a - 0.5 * np.tanh(x[..., :ACTIONS])) ** 2).sum(-1)
         one.learn(Mini(x, a, r, x, np.zeros_like(r), np.ones_like(a), np.ones_like(a)), config)
     x = torch.from_numpy(rng.normal(size=(500, INPUTS)).astype(np.float32))
-    off = one.act(one.actor, x)[2] - 0.5 * torch.tanh(x[:, :ACTIONS])
+    off = one.actions(one.actor, x)[2] - 0.5 * torch.tanh(x[:, :ACTIONS])
     assert float(off.square().mean().sqrt()) < 0.15  # doing nothing: 0.31
 
 
