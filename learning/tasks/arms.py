@@ -14,13 +14,14 @@ import numpy as np
 
 from ...sims.model import Model
 from ...sims.worlds import BAD_CONTACT, NONFINITE, Watch, terms
-from ...sims.worlds.places import rounded_tip
+from ...sims.worlds.places import middle, rounded_tip
 from ...sims.worlds.watch import Folded, first, gap, height_of, last, least, total, trouble
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
 from .fingers import FINGERS, READY, SHARES, SIGNALS, finger_joints, finger_signals
 from .locomotion import WEIGHTS, CostWeights, Locomotion
+from .mirror import Mirror, observed, turned
 
 ARM = 10
 """Numbers of an arm (Eq. 5): shoulder, elbow, wrist, fingers."""
@@ -110,9 +111,11 @@ class Arms(Locomotion):
         elif state == "paper":
             fingers = {model.joint_body(name) for side in finger_joints(model) for name in side}
             own = model.descendants(model.joint_body(model.root))
-            bodies = [model.body_names[b] for b in own if b not in fingers]
-            more |= {f"body {b}": terms.point(b) for b in bodies}
-            more |= {f"body {b} velocity": terms.velocity(b) for b in bodies}
+            bodies = {
+                name: middle(model, name) for name in (model.body_names[b] for b in own if b not in fingers)
+            }
+            more |= {f"body {name}": terms.point(place) for name, place in bodies.items()}
+            more |= {f"body {name} velocity": terms.velocity(place) for name, place in bodies.items()}
             felt = ["ball", "ball velocity", *(n for n in more if n.startswith("body "))]
             felt += [*(f"to {tip}" for tip in tips), "com", "com_velocity", "momentum"]
         super().__init__(model, graph, worlds, device, threads, weights.legs, finger_signals(model), more)
@@ -123,6 +126,7 @@ class Arms(Locomotion):
         """(fragments, 20) bool: what acts on the ball, X of P1 5.1"""
         kinds = self.terms
         self._arms = np.concatenate([np.arange(self.probe.size)[self.columns[n]] for n in felt])
+        self._felt_arms = felt
         self._units = np.concatenate([np.full(kinds[n].count, UNITS[kinds[n].kind]) for n in felt])
         self._legs_too = state in ("reduced", "ballistic", "full")
         self._speeds = _arm_dofs(model) if state == "full" else None
@@ -180,6 +184,22 @@ class Arms(Locomotion):
             speed = self.sim.joint_qd[:, self._speeds] - self.graph.start_qd[k][:, self._speeds]
             parts += [speed / JOINT_SPEED, self._before / MOVE]
         return np.concatenate(parts, axis=1)
+
+    def mirrored(self) -> tuple[Mirror, Mirror]:
+        """What a mirror does to the state, and to the actions."""
+        roles, by_side = self.model.roles, ("shoulders", "elbows", "wrists")
+        sides = [[roles.both(part)[side] for part in by_side] for side in range(2)]
+        arms = turned(self.model, [*sides[0], *sides[1]])
+        place = np.concatenate([ARM * side + np.arange(ARM - len(SIGNALS)) for side in range(2)])
+        source, sign = (np.arange(2 * ARM) + ARM) % (2 * ARM), np.ones(2 * ARM)
+        source[place], sign[place] = place[arms.source], arms.sign
+        action = Mirror(source, sign)
+        state = [observed(self.terms, self._felt_arms)]
+        if self._legs_too:
+            state.append(super().mirrored()[0])
+        if self._speeds is not None:
+            state += [turned(self.model, _arm_joints(self.model)), action]
+        return Mirror.joined(state), action
 
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         if first == 0:
@@ -256,11 +276,14 @@ def _forearms(model: Model) -> list[str]:
     return [model.body_names[model.joint_body(elbow)] for elbow in model.roles.both("elbows")]
 
 
-def _arm_dofs(model: Model) -> np.ndarray:
-    """Of both arms' joints, as the columns of their offsets."""
+def _arm_joints(model: Model) -> list[str]:
+    """Both arms', in the order of their columns of offsets."""
     roles = model.roles
-    joints = [*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists")]
-    return np.concatenate([np.arange(model.nv)[model.dof_slice(joint)] for joint in joints])
+    return [*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists")]
+
+
+def _arm_dofs(model: Model) -> np.ndarray:
+    return np.concatenate([np.arange(model.nv)[model.dof_slice(joint)] for joint in _arm_joints(model)])
 
 
 def _spread() -> np.ndarray:

@@ -34,6 +34,11 @@ def find_place(model: Model, where: str | Place) -> Place:
     return Place(where, _triple(model.first_shape(model.body(where)).pos))
 
 
+def middle(model: Model, body: str) -> Place:
+    """The centre of mass of a body."""
+    return Place(body, _triple(model.body_com[model.body(body)]))
+
+
 def tip(model: Model, body: str) -> Place:
     """The end of a body's capsules that is farthest from its joint, as a finger's tip. Raises ValueError
     where it has no capsule."""
