@@ -8,12 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...sims import planar
 from ...sims.model import Model
-from ...sims.planar import heading, turned, wrapped
+from ...sims.planar import heading, wrapped
 from ...sims.worlds import FALL, NONFINITE, Group, Probe, Signal, terms
 from ..graph import STEPS, ControlGraph
 from ..starts import Starts
 from .follow import Follow
+from .mirror import Mirror, observed, turned
 
 STEERED, FELT = 17, 20
 """Numbers that a policy changes, and that it feels, on the player."""
@@ -86,7 +88,7 @@ class Locomotion(Follow):
     ):
         roles = model.roles
         hips, knees, ankles, toes = (roles.both(part) for part in ("hips", "knees", "ankles", "toes"))
-        steered = (roles.spine[0], *hips, *knees, *ankles)
+        self.steered = steered = (roles.spine[0], *hips, *knees, *ankles)
         arms = (*roles.both("shoulders"), *roles.both("elbows"), *roles.both("wrists"))
         pushed = (roles.one("trunk"), *roles.both("hands"))
         super().__init__(model, graph, worlds, device, threads, (*steered, *arms, *signals), pushed)
@@ -147,6 +149,12 @@ class Locomotion(Follow):
         off = (self.felt[:, self._felt] - self.start[k][:, self._felt]) / self.scale
         return np.concatenate([off, self.astray[:, None] / HEADING_UNIT], axis=1)
 
+    def mirrored(self) -> tuple[Mirror, Mirror]:
+        """What a mirror does to the state, and to the actions."""
+        alone = Mirror(np.zeros(1, int), np.full(1, -1.0))  # the turning speed; how far it faces away
+        state = [observed(self.terms, [*UNITS, *self.model.roles.feet]), alone, alone]
+        return Mirror.joined(state), turned(self.model, self.steered)
+
     @property
     def astray(self) -> np.ndarray:
         """(worlds,) [rad] to the left of where each world should face"""
@@ -173,7 +181,7 @@ class Locomotion(Follow):
         them, and as far off its heading as they are now."""
         joint_q, joint_qd = self.sim.joint_q[worlds], self.sim.joint_qd[worlds]
         by = self.begins[k] - self.heading[worlds]
-        return Starts(k, *turned(joint_q, joint_qd, by, self.graph.start_q[k, :2], self.loose))
+        return Starts(k, *planar.turned(joint_q, joint_qd, by, self.graph.start_q[k, :2], self.loose))
 
     def become(self, sources: np.ndarray) -> None:
         super().become(sources)
