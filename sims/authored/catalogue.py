@@ -40,6 +40,7 @@ AUTHORED: dict[str, Callable[[Model], tuple[Reference, np.ndarray, np.ndarray]]]
     "waist": waist,
     "switch_hands": switch,
 }
+"""Name -> its author: reference, way of the ball (rows, 3) [m], which hand has it (rows, 2) bool."""
 
 
 def authored_clip(model: Model, name: str) -> Authored:

@@ -21,8 +21,16 @@ SWEEPS = 6
 MAX_SPEED = 100.0
 """No joint turns faster [rad/s]. Explicit velocity-product forces would tear a limb apart beyond 1 / h."""
 
-NONFINITE, FALL, BAD_CONTACT, OVERSPEED, FAR = 1, 2, 4, 8, 16
-"""Bits of `Simulation.status`."""
+NONFINITE = 1
+"""Bit of `Simulation.status`: the state is not finite."""
+FALL = 2
+"""Bit of `Simulation.status`: a part of the player other than its feet touched the ground."""
+BAD_CONTACT = 4
+"""Bit of `Simulation.status`: the ball touched the player elsewhere than on a hand."""
+OVERSPEED = 8
+"""Bit of `Simulation.status`: a joint reached `max_speed`."""
+FAR = 16
+"""Bit of `Simulation.status`: a free joint was too far from the origin for slow motion."""
 
 PORTS = {"joint_q": "q", "joint_qd": "qd", "joint_target_q": "target", "joint_f": "joint_f"}
 """What a port can be opened to, and the array behind it."""

@@ -16,6 +16,7 @@ from .rate import given_rate
 __all__ = ["SUFFIXES", "ClipError", "read_clip", "read_part"]
 
 SUFFIXES = (".bvh", ".amc", ".pt")
+"""Of files that are clips."""
 
 
 def read_clip(
