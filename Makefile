@@ -1,9 +1,9 @@
-# make setup | demo | test | test-all | bench | lint | types | wheel | clean
+# make setup | demo | test | test-all | bench | lint | types | docs | wheel | clean
 # EXTRAS: what is set up beside the client's own needs. The demo sets up none where nothing is set up yet.
 
 PYTHON ?= python3
 VENV   ?= .venv
-EXTRAS ?= dev,gym,learn,onnx
+EXTRAS ?= dev,docs,gym,learn,onnx
 PY     := $(VENV)/bin/python
 BARE   := $(VENV)/.stamp-
 STAMP  := $(BARE)$(EXTRAS)
@@ -12,7 +12,7 @@ TEST   := $(PY) -m pytest -q -n auto --maxprocesses 4 --dist loadfile
 WHAT    = -q -c constraints.txt -e '.$(patsubst %,[%],$(@:$(BARE)%=%))'
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all bench lint types wheel clean
+.PHONY: setup demo test test-all bench lint tree types docs wheel clean
 
 setup: $(STAMP)
 
@@ -40,12 +40,18 @@ lint: $(STAMP)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 
-# A checker follows no __path__: it sees the packages as links in one folder.
+# What reads source and runs none follows no __path__: it sees the packages as links in one folder.
 INSIDE := $(filter-out %__pycache__ warpdribble,$(wildcard warpdribble/*) $(patsubst %/__init__.py,%,$(wildcard */__init__.py)))
-types: $(STAMP)
+tree:
 	@mkdir -p .typing/warpdribble && find -L .typing -type l -delete
 	@ln -sfn $(addprefix ../../,$(INSIDE)) .typing/warpdribble
+
+types: $(STAMP) tree
 	$(PY) -m mypy
+
+docs: $(STAMP) tree
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build
+	@echo "build/site/index.html opens in any browser, from the disk too"
 
 wheel: $(STAMP)
 	$(PY) -m build
