@@ -1,8 +1,8 @@
-"""The pages tell the truth: snippets run, commands parse, and what is named exists.
+"""The pages tell the truth: snippets and commands run, and what is named exists.
 
 A snippet runs in a temporary folder, after those before it on its page. Info strings: `python slow` for more
 than a few seconds (`make test-all`), `python no-run` for what cannot run here (its imports are tried all the
-same).
+same). Commands run likewise, made short.
 """
 
 import ast
@@ -13,6 +13,7 @@ import inspect
 import io
 import re
 import shlex
+import shutil
 import subprocess
 import typing
 from importlib import import_module
@@ -230,6 +231,90 @@ def test_commands_are_understood(page):
             # A command named in passing need not say everything that it asks for.
             tried = [arguments, [*arguments, "cmu"], [*arguments, "cmu", "--out", "run"]]
             assert any(not parse(one) for one in tried), f"{page.name}: `{span}`\n{parse(arguments)}"
+
+
+SHORT = {"--seconds": "1", "--cycles": "2", "--trials": "2", "--repeat": "2", "--rounds": "1"}
+"""Option -> value with which a command takes seconds."""
+ADDED = {
+    "demo": ["--seconds", "1"],
+    "learn": ["--stage", "locomotion", "--iterations", "1"],
+    "bench solve": ["--sweeps", "6", "--worlds", "16"],
+}
+"""What makes a command short that says none of it."""
+QUICK = {"motion", "skill"}
+
+
+def shortened(arguments):
+    """The command as it is run here: on the clip that there is, for seconds."""
+    words = ["clip.bvh" if word in ("CLIP", "06_12.bvh") else word for word in arguments]
+    words = [SHORT.get(before, word) for before, word in zip(["", *words], words) if word != "--pushes"]
+    if "--frames" in words:
+        at = words.index("--frames")
+        words[at : at + 3] = ["--frames", "0", "120"]
+    more = [added for name, added in ADDED.items() if " ".join(words).startswith(name)]
+    return words + [word for added in more if added[0] not in words for word in added]
+
+
+def can_run(arguments):
+    """Whether what a command needs is here: recordings, a GPU."""
+    from warpdribble.skills import SkillError, read_skill, skill_names
+    from warpdribble.skills.staged import find_clip
+
+    named = [read_skill(word) for word in arguments if word in skill_names()]
+    try:
+        return all(find_clip(one) for one in named if one.clip) and "cuda:0" not in arguments
+    except SkillError:
+        return False
+
+
+def run_commands(page, wanted):
+    """Run the page's commands in their order, those of which it is wanted."""
+    from warpdribble import cli
+
+    for _, text, _ in fences(page, "sh"):
+        lines = [line for line in text.splitlines() if not line.startswith("for ")]
+        for arguments in map(shortened, said_commands("\n".join(lines))):
+            if wanted(arguments) and can_run(arguments):
+                assert cli.main(arguments) == 0, f"{page.name}: warpdribble {' '.join(arguments)}"
+                if arguments[0] == "learn":  # what follows is tried on a run of which every stage is there
+                    out = arguments[arguments.index("--out") + 1]
+                    shutil.rmtree(out)
+                    shutil.copytree(ROOT / "assets/controllers/dribble-right-authored", out)
+
+
+@pages
+def test_quick_commands_run(page, folder):
+    run_commands(page, lambda arguments: arguments[0] in QUICK)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "page",
+    [page for page in PAGES if any(list(said_commands(text)) for _, text, _ in fences(page, "sh"))],
+    ids=lambda page: page.stem,
+)
+def test_commands_run(page, folder):
+    run_commands(page, lambda arguments: True)
+
+
+def test_quoted_messages_are_said():
+    """Of docs/troubleshooting.md: what stands in the first column as said by the program, is in its source.
+    `...` is what differs."""
+    page = ROOT / "docs/troubleshooting.md"
+    texts = {
+        node.value
+        for folder in ("sims", "learning", "warpdribble")
+        for file in (ROOT / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    }
+    rows = [line.split(" | ")[0] for line in page.read_text().splitlines() if line.startswith("| ")]
+    said = [span for row in rows for span in SPAN.findall(row) if re.search(r"^[a-z.].* ", span)]
+    said = [span for span in said if not span.startswith("warpdribble")]
+    assert len(said) > 15
+    for span in said:
+        for part in filter(None, (part.strip() for part in span.split("..."))):
+            assert any(part in text for text in texts), f"{page.name}: nothing says `{span}`"
 
 
 @pages
