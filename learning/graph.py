@@ -174,7 +174,7 @@ def clip_graph(
     rows = reference.frame_count - 1
     count = max(1, -(-rows // STEPS))
     held = np.minimum(np.arange(count * STEPS + 1), rows)
-    speed = _central_velocity(model, reference)[held]
+    speed = central_velocity(model, reference)[held]
     joint_q = reference.joint_q[held]
     targets = leading_targets(model, reference, feet, root_lead)[held]
     after = np.minimum(np.arange(count) + 1, count - 1)
@@ -201,7 +201,7 @@ def cyclic_graph(
     fitted = Reference(resample_q(model, cycle.reference.joint_q, at), cycle.reference.timestep)
     several = Cycle(fitted, cycle.turn, cycle.travel).repeat(model, 3)
     middle = slice(count * STEPS, 2 * count * STEPS + 1)  # so that it has neighbours on both sides
-    speed = _central_velocity(model, several)[middle]
+    speed = central_velocity(model, several)[middle]
     targets = leading_targets(model, several, feet)[middle]
     graph = _graph(
         several.joint_q[middle], speed, targets, fitted.timestep, (np.arange(count) + 1) % count, name
@@ -274,7 +274,7 @@ def joined(graphs: Sequence[ControlGraph], transitions: Sequence[Transition]) ->
     )
 
 
-def _central_velocity(model: Model, reference: Reference) -> np.ndarray:
+def central_velocity(model: Model, reference: Reference) -> np.ndarray:
     """Joint velocities (frames, nv) by central differences."""
     ahead = reference.velocity(model)
     return 0.5 * (ahead + np.concatenate([ahead[:1], ahead[:-1]]))
