@@ -256,13 +256,15 @@ def shortened(arguments):
 
 
 def can_run(arguments):
-    """Whether what a command needs is here: recordings, a GPU."""
+    """Whether what a command needs is here: recordings, a GPU, minutes of learning before it."""
     from warpdribble.skills import SkillError, read_skill, skill_names
     from warpdribble.skills.staged import find_clip
 
     named = [read_skill(word) for word in arguments if word in skill_names()]
+    if "cuda:0" in arguments or (arguments[0] == "learn" and arguments[-4:] != ADDED["learn"]):
+        return False
     try:
-        return all(find_clip(one) for one in named if one.clip) and "cuda:0" not in arguments
+        return all(find_clip(one) for one in named if one.clip)
     except SkillError:
         return False
 
