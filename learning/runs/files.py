@@ -19,6 +19,8 @@ from ...sims.errors import InputError
 from ...sims.files import whole
 
 LOCK = "lock"
+FAR_BEHIND = 1 << 30
+"""Byte of the lock's file that Windows locks: behind all text, as what is locked there nobody else reads."""
 
 
 def write_arrays(path: Path, arrays: dict[str, np.ndarray]) -> None:
@@ -107,6 +109,7 @@ def _lock(file: IO[str]) -> bool:
     except ModuleNotFoundError:  # Windows
         import msvcrt
 
+        os.lseek(file.fileno(), FAR_BEHIND, os.SEEK_SET)
         try:
             msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
         except OSError:

@@ -107,7 +107,7 @@ class Mapping:
 def read_mapping(name: str | Path) -> Mapping:
     """A shipped mapping by name, or a file by path. Raises MappingError."""
     if str(name) in SHIPPED:
-        return parse_mapping(asset(f"mappings/{name}.toml").read_text(), str(name))
+        return parse_mapping(asset(f"mappings/{name}.toml").read_text(encoding="utf-8"), str(name))
     path = Path(name)
     if path.suffix.lower() != ".toml":
         raise MappingError(f"{name}: a mapping is {', '.join(SHIPPED)}, or the path of a .toml file")

@@ -86,7 +86,7 @@ def entries(name: str) -> list[Entry]:
     """The files of a set. Raises ValueError for a set that is none."""
     if name not in SETS:
         raise ValueError(f"there is no data set '{name}'; there are {', '.join(SETS)}")
-    text = (resources.files("warpdribble.assets") / "clips.csv").read_text()
+    text = (resources.files("warpdribble.assets") / "clips.csv").read_text(encoding="utf-8")
     rows = csv.DictReader(text.splitlines())
     all_files = [Entry(r["file"], r["sha256"], int(r["bytes"]), r["url"]) for r in rows]
     return [entry for entry in all_files if entry.file.startswith(FOLDERS[name] + "/")]

@@ -98,7 +98,7 @@ def read_skill(name: str | Path) -> Skill:
         names = skill_names()
         if str(name) not in names:
             raise SkillError(name, "", f"no such skill; there are {', '.join(names)}, or give a .toml file")
-        return parse_skill(asset(f"skills/{name}.toml").read_text(), f"skills/{name}.toml")
+        return parse_skill(asset(f"skills/{name}.toml").read_text(encoding="utf-8"), f"skills/{name}.toml")
     try:
         return parse_skill(Path(name).read_text(encoding="utf-8"), str(name))
     except FileNotFoundError:

@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 import socket
+import sys
 
 import numpy as np
 import pytest
@@ -111,6 +112,33 @@ def test_an_error_lets_go(tmp_path):
     assert not (tmp_path / LOCK).exists()
     with held(tmp_path):
         pass
+
+
+class Bytes:
+    """Locks of bytes as Windows has them, in place of its module: from where a file is."""
+
+    LK_NBLCK = 2
+
+    def __init__(self):
+        self.taken = {}
+
+    def locking(self, file, mode, count):
+        assert mode == self.LK_NBLCK
+        at = os.lseek(file, 0, os.SEEK_CUR)
+        for byte in range(at, at + count):
+            if self.taken.setdefault(byte, file) != file:
+                raise PermissionError
+
+
+def test_a_folder_is_held_by_one_on_windows(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setitem(sys.modules, "msvcrt", locks := Bytes())
+    with held(tmp_path):
+        text = (tmp_path / LOCK).read_text()
+        assert text.startswith(f"process {os.getpid()} on ")
+        assert not locks.taken.keys() & range(len(text) + 1)  # nobody else could read those
+        with pytest.raises(InputError, match=text.strip()), held(tmp_path):
+            pytest.fail("held twice")
 
 
 def hold(folder, pipe):
