@@ -13,7 +13,7 @@ import tarfile
 import tomllib
 import zipfile
 from importlib import import_module
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 
@@ -29,6 +29,15 @@ NOT_SOURCE = shutil.ignore_patterns(
     ".git", ".venv*", "venv*", "build", "dist", "out", "*.egg-info", "__pycache__", ".*_cache",
     ".typing", ".hypothesis", "shared",
 )  # fmt: skip
+
+KINDS = {
+    "warpdribble": {".py", ".typed"},
+    "warpdribble/assets": {".csv", ".json", ".md", ".npz", ".py", ".toml", ".xml"},
+    "warpdribble/assets/replay": {".LICENSE", ".html", ".js"},
+}
+"""Folder of the wheel -> the kinds of files in it, and below where no other folder is nearer."""
+LARGEST = 4e6
+"""Bytes of a wheel, so that a recording or a run does not slip in."""
 
 IMPORT_ALL = f"""
 from importlib import import_module, resources
@@ -56,6 +65,13 @@ def build(kind, tree, out):
     pytest.importorskip("setuptools", minversion="77")
     script = f"from setuptools import build_meta as b; print(b.build_{kind}({str(out)!r}))"
     return out / run(sys.executable, "-c", script, cwd=tree).splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel of the tree as it is."""
+    out = tmp_path_factory.mktemp("wheel")
+    return build("wheel", copy_tree(out / "tree"), out)
 
 
 def make_env(folder):
@@ -128,11 +144,47 @@ def test_editable_imports_and_sees_edits(tmp_path):
 
 
 @pytest.mark.slow
-def test_version_comes_from_the_package(tmp_path):
-    wheel = build("wheel", copy_tree(tmp_path / "tree"), tmp_path)
+def test_wheel_holds_these_kinds_of_files(wheel):
+    found = {folder: set() for folder in KINDS}
+    for path in map(PurePosixPath, zipfile.ZipFile(wheel).namelist()):
+        if not path.parts[0].endswith(".dist-info"):
+            near = next(str(up) for up in path.parents if str(up) in KINDS)
+            found[near].add(path.suffix or path.name)
+    assert found == KINDS
+    assert wheel.stat().st_size < LARGEST
+
+
+@pytest.mark.slow
+def test_wheel_names_the_licences_of_what_is_in_it(wheel):
+    names = {PurePosixPath(name).name for name in zipfile.ZipFile(wheel).namelist() if "/licenses/" in name}
+    assert names == {"LICENSE", "NOTICE.md", "three.LICENSE"}
+
+
+@pytest.mark.slow
+def test_commands_of_a_wheel_run_from_any_folder(tmp_path, wheel):
+    install(make_env(tmp_path / "env"), wheel)
+    (folder := tmp_path / "elsewhere").mkdir()
+    command = tmp_path / "env" / "bin" / "warpdribble"
+    assert "simulate" in run(command, "--help", cwd=folder)
+    assert "switch-hands" in run(command, "skill", "list", cwd=folder)
+    run(command, "demo", "--seconds", "2", cwd=folder)
+    there = {path.name for path in (folder / "out").iterdir()}
+    assert there == {"demo.usdc", "demo.html", "demo.png", "demo.plots.png"}
+
+
+@pytest.mark.slow
+def test_version_comes_from_the_package(wheel):
     import warpdribble
 
     assert wheel.name.split("-")[1] == warpdribble.__version__
+
+
+def test_version_is_the_same_everywhere():
+    import warpdribble
+
+    heads = re.findall(r"^## \[(.*?)\]", (ROOT / "CHANGELOG.md").read_text(), re.M)
+    cited = re.search(r"^version: (.*)$", (ROOT / "CITATION.cff").read_text(), re.M)
+    assert next(head for head in heads if head != "Unreleased") == warpdribble.__version__ == cited[1]
 
 
 def test_pyproject_lists_what_exists():
