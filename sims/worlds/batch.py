@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
@@ -42,6 +43,8 @@ def widest_lanes() -> int:
 def find_device(name: str) -> wp.Device:
     """Warp's device of that name. Raises ValueError with those that there are."""
     try:
+        if name.startswith("cuda") and not wp.is_cuda_available():
+            raise ValueError(name)  # to ask the driver would have Warp say so on stderr
         return wp.get_device(name)
     except (ValueError, RuntimeError):
         there = ", ".join(str(device) for device in wp.get_devices())
@@ -50,6 +53,25 @@ def find_device(name: str) -> wp.Device:
 
 _LOADED: set[tuple[ModuleType, str]] = set()
 _LOADING = threading.Lock()
+_TOLD: list[Callable[[], object]] = []
+
+
+def cached(program: ModuleType, device: wp.Device) -> bool:
+    """Whether kernels lie compiled in Warp's cache, so that loading them takes no compiler."""
+    block = 1 if device.is_cpu else None  # as Warp launches on each
+    name = wp.get_module(program.__name__).get_module_identifier(block)
+    return any(Path(str(wp.config.kernel_cache_dir), name).glob("*.o" if device.is_cpu else "*.sm*"))
+
+
+@contextlib.contextmanager
+def telling(compiles: Callable[[], object]) -> Iterator[None]:
+    """Meanwhile, call `compiles` before kernels are compiled, which takes seconds; not where they are
+    cached."""
+    _TOLD.append(compiles)
+    try:
+        yield
+    finally:
+        _TOLD.remove(compiles)
 
 
 def _load(program: ModuleType, device: wp.Device) -> None:
@@ -57,6 +79,9 @@ def _load(program: ModuleType, device: wp.Device) -> None:
     thread may be running."""
     with _LOADING:
         if (program, device.alias) not in _LOADED:
+            if _TOLD and not cached(program, device):
+                for compiles in _TOLD:
+                    compiles()
             program.load(device)
             _LOADED.add((program, device.alias))
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import os
 import re
 import select
 import sys
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TextIO, TypeVar
 
 if TYPE_CHECKING:
@@ -51,14 +54,24 @@ def _unread(stream: TextIO) -> bool:
 
 @contextlib.contextmanager
 def compiling() -> Iterator[None]:
-    """Show, on stderr, that kernels are compiled meanwhile."""
+    """Show, on stderr, where kernels are compiled meanwhile; nothing where they are cached."""
     from rich.console import Console
 
-    waiting = "compiling kernels (once; about a minute the first time, then cached) ..."
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        print(waiting, file=sys.stderr, flush=True)
-    with console.status(waiting):
+    from ..sims.worlds.batch import telling
+
+    waiting = "compiling kernels (about a minute, once: then they are cached) ..."
+    console, shown = Console(stderr=True), contextlib.ExitStack()
+    told = False
+
+    def tell() -> None:
+        nonlocal told
+        if not told and console.is_terminal:
+            shown.enter_context(console.status(waiting))
+        elif not told:
+            print(waiting, file=sys.stderr, flush=True)
+        told = True
+
+    with shown, telling(tell):
         yield
 
 
@@ -90,11 +103,56 @@ def bar(label: str, total: int) -> Iterator[Progress]:
         )
 
 
+NO_DRIVER = "NVIDIA CUDA driver"
+"""Of what Warp says on a machine without one."""
+
+
 def quiet_warp() -> None:
-    """Let Warp report errors only."""
+    """Let Warp report errors only. That there is no CUDA driver is said where there is a card to drive."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
+    warp_begins()
+
+
+@functools.cache
+def warp_begins() -> str:
+    """Begin Warp, once; what it says of CUDA, "" for nothing."""
+    import warp
+
+    said = _on_stderr(warp.init)
+    for line in said.splitlines():
+        if NO_DRIVER not in line or _has_card():
+            print(line, file=sys.stderr, flush=True)
+    return " ".join(re.sub(r"Warp CUDA \w+: ", "", said).split())
+
+
+def _on_stderr(job: Callable[[], object]) -> str:
+    """What native code writes to stderr while a job is done."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # closed
+        job()
+        return ""
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            job()
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+        file.seek(0)
+        return file.read().decode(errors="replace")
+
+
+def _has_card() -> bool:
+    """Whether a card of NVIDIA's is on the PCI bus, where Linux lists that."""
+    for vendor in Path("/sys/bus/pci/devices").glob("*/vendor"):
+        with contextlib.suppress(OSError):
+            display = vendor.with_name("class").read_text().startswith("0x03")
+            if display and vendor.read_text().strip() == "0x10de":
+                return True
+    return False
 
 
 def check_device(device: str) -> None:
@@ -109,13 +167,27 @@ def find_device(device: str) -> None:
 
     check_device(device)
     quiet_warp()
-    batch.find_device(device)
+    try:
+        batch.find_device(device)
+    except ValueError as error:
+        said = warp_begins()
+        raise ValueError(f"--device {device}: {error}{said and f' ({said})'}") from None
 
 
 def check_range(option: str, value: float, least: float, most: float) -> None:
     """Raise ValueError for a number outside a range, or none."""
     if not least <= value <= most:
         raise ValueError(f"{option} {value:g}: give a number from {least:g} to {most:g}")
+
+
+def check_new(paths: Iterable[Path], overwrite: bool) -> None:
+    """Raise InputError for files that are there, and would be lost, unless they may be."""
+    from ..sims.errors import InputError
+
+    there = [path for path in paths if path.exists()]
+    if there and not overwrite:
+        more = f", and {len(there) - 1} more" if len(there) > 1 else ""
+        raise InputError(f"is there already{more}", there[0], "overwrite")
 
 
 def without_nan(value: Any) -> Any:

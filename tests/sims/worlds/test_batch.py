@@ -8,7 +8,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import warp as wp
 
+from warpdribble import kernels
 from warpdribble.sims.worlds import batch
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -45,6 +47,30 @@ def test_threads_that_ask_at_once_load_once():
     for thread in threads:
         thread.join()
     assert loads == [device] and seen == [1, 1, 1, 1]
+
+
+def test_kernels_are_cached_once_they_were_compiled(tmp_path, monkeypatch):
+    program, device = kernels.program(1, "place"), batch.find_device("cpu")
+    program.load(device)
+    assert batch.cached(program, device)
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    assert not batch.cached(program, device)
+
+
+def test_it_is_told_before_kernels_are_compiled_and_only_then(monkeypatch):
+    order = []
+
+    class Program(SimpleNamespace):
+        __hash__ = object.__hash__
+
+    old, new, other = (Program(load=lambda device: order.append("loads")) for _ in range(3))
+    device = SimpleNamespace(alias="cpu")
+    monkeypatch.setattr(batch, "cached", lambda program, device: program is old)
+    with batch.telling(lambda: order.append("told")):
+        for program in (old, new, new):
+            batch._load(program, device)
+    batch._load(other, device)
+    assert order == ["loads", "told", "loads", "loads"]
 
 
 @pytest.mark.slow
