@@ -25,7 +25,7 @@ $(sort $(STAMP) $(BARE)): pyproject.toml constraints.txt
 	@touch $@
 
 demo: $(or $(wildcard $(STAMP)),$(BARE))
-	$(PY) -m warpdribble demo
+	$(PY) -m warpdribble demo --overwrite
 
 test: $(STAMP)
 	$(TEST) -m "not slow"

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
 from tyro.conf import Positional
+
+WHOLE = (0, -1)
+"""Frames of a whole clip."""
+
+
+def refuse_for_skill(command: Any, options: Iterable[str], skill: object) -> None:
+    """Raise ValueError where options of a command were given that a skill's file says."""
+    usual = {f.name: f.default for f in fields(command)}
+    given = [f"--{name.replace('_', '-')}" for name in options if getattr(command, name) != usual[name]]
+    if given:
+        raise ValueError(f"{' and '.join(given)}: '{skill}' is a skill, whose file says it")
 
 
 @dataclass
@@ -44,11 +56,11 @@ class ClipFile:
 class ClipInput(ClipFile):
     """A part of a recorded clip."""
 
-    frames: tuple[int, int] = (0, -1)
-    """First and last frame of the part to use, counted from 0; -1 is the clip's last."""
+    frames: tuple[int, int] | None = None
+    """First and last frame of the part to use, counted from 0; -1 is the clip's last. All when not given."""
     repair: str = ""
     """Repairs, joined by commas: spikes, toes, lowpass, ground; or all."""
 
     def reading(self) -> dict[str, Any]:
         """Arguments for `clips.read_part`."""
-        return super().reading() | {"frames": self.frames, "repairs": self.repair}
+        return super().reading() | {"frames": self.frames or WHOLE, "repairs": self.repair}

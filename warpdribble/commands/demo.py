@@ -49,7 +49,7 @@ class Demo(Outputs):
             raise InputError(f"no such controller ({', '.join(shipped_controllers())} ship)", self.controller)
         check_range("--seconds", self.seconds, 0.05, 600.0)
         check_range("--push", self.push, 0.0, 1e4)
-        check_outputs(self.out)
+        check_outputs(self)
         find_device(self.device)
         one = Run.load(self.controller).learned(STAGES)
         graph = one.graph

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
-from .console import bar, check_range, compiling, find_device, say, warmed
+from .console import bar, check_new, check_range, compiling, find_device, say, warmed
 from .output import Outputs, check_outputs, say_trajectory, write_outputs
 
 
@@ -43,7 +43,7 @@ class Export(Outputs):
         check_range("--push", self.push, 0.0, 1e4)
         check_range("--seed", self.seed, 0, 2**32)
         one = Run.load(self.folder).learned(STAGES, self.stage)
-        check_outputs(self.out)
+        check_outputs(self)
         find_device(self.device)
         with compiling():
             task = warmed(one.task(1, self.device))
@@ -82,7 +82,7 @@ class Export(Outputs):
         one = Run.load(self.folder).learned(STAGES, self.stage or "policy")
         if not isinstance(one.controller, NetworkPolicy):
             raise InputError(f"what {one.stage.name} has learned is no network", self.folder, "stage")
-        check_writable(path, (".onnx",))
+        check_new([check_writable(path, (".onnx",))], self.overwrite)
         model = onnx_model(one.controller, f"{one.skill['name']}, {one.iteration} iterations")
         with whole(path) as part:
             part.write_bytes(model.SerializeToString())

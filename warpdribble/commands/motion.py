@@ -33,8 +33,9 @@ class Info(ClipInput):
         from ..clips.read import read_part
         from ..sims.recording.quality import examine
 
-        motion, notes = read_part(**self.reading())
-        quality = examine(motion, self.frames[0])
+        reading = self.reading()
+        motion, notes = read_part(**reading)
+        quality = examine(motion, reading["frames"][0])
         if self.format == "json":
             report = {"clip": str(self.clip), "notes": notes} | asdict(quality)
             say(json.dumps(without_nan(report), indent=2, allow_nan=False))
@@ -83,7 +84,7 @@ class MotionGroup:
 
 
 def _table(command: Info, notes: list[str], quality: Quality) -> list[str]:
-    first = command.frames[0]
+    first = command.reading()["frames"][0]
     part = f"frames {first} to {first + quality.frames - 1}"
     lines = [f"clip        {command.clip}, {part}, {quality.duration:.2f} s at {quality.rate:.4g} Hz"]
     lines += [f"            {note}" for note in notes]

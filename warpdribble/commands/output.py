@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from .console import say
+from .console import check_new, say
 
 if TYPE_CHECKING:
     from ..learning.evaluate.tracking import Tracking
@@ -26,17 +26,22 @@ class Outputs:
     """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
     html: bool = True
     """Write the replay, a page for any browser, beside the take."""
+    overwrite: bool = False
+    """Replace files that are there; they are left alone otherwise."""
     device: str = "cpu"
     """Where to simulate: cpu, cuda:0, ..."""
 
 
-def check_outputs(out: Path) -> None:
-    """Raise ValueError where the take or what goes beside it cannot be written."""
-    from ..takes.take import check_writable
+def check_outputs(command: Outputs) -> None:
+    """Raise ValueError where the take or what goes beside it cannot be written, or is there already."""
+    from ..takes.take import check_writable, layer_files
 
-    check_writable(out)
-    for other in (".png", ".plots.png", ".html"):
-        check_writable(out.with_suffix(other), (".png", ".html"))
+    out = check_writable(command.out)
+    beside = [out.with_suffix(s) for s in (".png", ".plots.png", *([".html"] if command.html else []))]
+    for other in beside:
+        check_writable(other, (".png", ".html"))
+    layers = layer_files(out).values() if out.suffix == ".usda" else ()
+    check_new([out, *layers, *beside], command.overwrite)
 
 
 def write_outputs(

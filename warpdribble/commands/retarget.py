@@ -78,10 +78,11 @@ class Cycles(ClipInput):
             raise ValueError("--shortest and --longest: give rising times of 0.05 to 60 s")
         if self.most < 1:
             raise ValueError(f"--most {self.most}: give a number of 1 or more")
-        motion, _ = read_part(**self.reading())
+        reading = self.reading()
+        motion, _ = read_part(**reading)
         mapping = read_mapping(self.mapping) if self.mapping else None
         found = find_cycles(motion, mapping, self.shortest, self.longest, self.most)
-        start = self.frames[0]
+        start = reading["frames"][0]
         if not found:
             say(f"no part of {self.shortest} to {self.longest} s ends as it begins")
         else:

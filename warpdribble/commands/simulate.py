@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Literal
 
-from .clip_input import ClipInput
-from .console import bar, check_device, compiling, quiet_warp, say, warmed
+from .clip_input import ClipInput, refuse_for_skill
+from .console import bar, compiling, find_device, say, warmed
 from .output import Outputs, check_outputs, say_trajectory, write_outputs
 
 if TYPE_CHECKING:
@@ -79,12 +79,15 @@ class Simulate(ClipInput, Outputs):
         from ..skills import clip_skill, is_skill, read_skill
 
         if is_skill(self.clip):
+            refuse_for_skill(
+                self, [*(f.name for f in fields(ClipInput) if f.name != "clip"), "mapping"], self.clip
+            )
             one = read_skill(self.clip)
             return one if self.ball else replace(one, ball=False)
         reading = self.reading()
         return clip_skill(
             self.clip,
-            self.frames,
+            reading["frames"],
             repairs=self.repair,
             units=reading["units"],
             up=reading["up"],
@@ -110,9 +113,8 @@ def _check(command: Simulate) -> None:
     """Raise ValueError or OSError for what cannot work, before anything is computed."""
     if command.repeat < 1:
         raise ValueError(f"--repeat {command.repeat}: give a number of 1 or more")
-    check_device(command.device)
-    quiet_warp()
-    check_outputs(command.out)
+    find_device(command.device)
+    check_outputs(command)
 
 
 def _check_length(duration: float, repeat: int) -> None:

@@ -105,6 +105,11 @@ def check_writable(path: str | Path, suffixes: tuple[str, ...] = SUFFIXES) -> Pa
     return path
 
 
+def layer_files(path: Path) -> dict[str, Path]:
+    """The files beside a layered take, by layer."""
+    return {name: path.with_suffix(f".{name}.{kind}") for name, kind in LAYERS.items()}
+
+
 def write_take(
     path: str | Path,
     take: Take,
@@ -186,7 +191,7 @@ def _write(path: Path, take: Take, skin: bool, joints: str, layered: bool, spaci
     figure.add_static(stage, take, edit)
     del stage
     if layered:
-        names = {name: path.with_suffix(f".{name}.{kind}") for name, kind in LAYERS.items()}
+        names = layer_files(path)
         for name, layer in layers.items():
             _export(layer, names[name])
         root.subLayerPaths = [f"./{file.name}" for file in names.values()]
