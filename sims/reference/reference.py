@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..model import Model
-from ..planar import heading, over_ground, rotation, wrapped
+from ..planar import heading, over_ground, planar, rotation, wrapped
 from ..signals import interpolate_lines, interpolate_rotations, smoothstep
 
 ALONG = 0.05
@@ -56,6 +56,15 @@ class Cycle:
     """(2,) [m] of the root over the ground per cycle, seen from the cycle's first root position."""
     gap: float = 0.0
     """[rad] root mean square over the model's joints of what had to be closed."""
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """(2,) [m] of the root per cycle, ahead and to the left, as the player faces in the mean of a cycle;
+        where it turns, as it faces at the cycle's begin."""
+        faces = np.unwrap(planar(self.reference.joint_q)[:, 2])
+        begin = float(np.mean(faces - self.turn * np.linspace(0.0, 1.0, len(faces))))
+        ahead, left = rotation(-begin) @ np.asarray(self.travel)
+        return float(ahead), float(left)
 
     def repeat(self, model: Model, count: int) -> Reference:
         """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count

@@ -82,6 +82,12 @@ def data_folder() -> Path:
     return Path(os.environ.get("WARPDRIBBLE_DATA") or pooch.os_cache("warpdribble"))
 
 
+def set_of(clip: str | Path) -> str:
+    """The name of the set that a clip of the data folder, as 'cmu/06_12.bvh', is of; "" for none."""
+    folder = Path(clip).parts[0] if Path(clip).parts else ""
+    return next((name for name, own in FOLDERS.items() if own == folder), "")
+
+
 def entries(name: str) -> list[Entry]:
     """The files of a set. Raises ValueError for a set that is none."""
     if name not in SETS:

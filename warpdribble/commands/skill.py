@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
 from .clip_input import ClipFile
-from .console import say
+from .console import check_new, say
+
+if TYPE_CHECKING:
+    from ..sims import Cycle
 
 
 @dataclass
@@ -17,6 +21,7 @@ class List:
     """The skills that ship, and whether their clips are here."""
 
     def run(self) -> int:
+        from ..clips.data import set_of
         from ..skills.skill import SkillError, read_skill, skill_names
         from ..skills.staged import find_clip
 
@@ -28,7 +33,7 @@ class List:
                 try:
                     find_clip(one)
                 except SkillError:
-                    where += " (not here: warpdribble fetch)"
+                    where += f" (not here: warpdribble fetch {set_of(one.clip)})"
             say(f"{name:22} {'cycle ' if one.cyclic else 'once  '} {one.description}")
             say(f"{'':22}        {where}")
         return 0
@@ -54,8 +59,7 @@ class Show:
         step = one.reference.timestep
         say(f"  {one.reference.duration:.2f} s, {one.reference.frame_count} rows")
         if one.cycle is not None:
-            turn, (x, y) = 57.2958 * one.cycle.turn, one.cycle.travel
-            say(f"  per cycle: turns {turn:.0f} degrees, travels {x:.2f} m ahead and {y:.2f} m left")
+            say(f"  per cycle: {_way(one.cycle)}")
         if one.ball is not None:
             for hand, spans in one.ball.contact(step).items():
                 say(f"  {hand} hand: {', '.join(f'{a:.2f}-{b:.2f}' for a, b in spans)} s")
@@ -78,20 +82,26 @@ class Draft(ClipFile):
     """Of the skill; the clip's when empty."""
     mapping: str = ""
     """Names of the skeleton's joints, as for motion retarget."""
+    overwrite: bool = False
+    """Replace a file that is there; it is left alone otherwise."""
 
     def run(self) -> int:
         from ..sims import Model
         from ..skills.draft import draft, write_draft
         from ..skills.skill import parse_skill
 
+        check_new([self.out], self.overwrite)
         reading = self.reading()
         clip = reading.pop("path")
         model = Model.load("player")
         text = draft(model, clip, self.frames, self.name, self.mapping, self.whole, **reading)
-        parse_skill(text, str(self.out))
+        one = parse_skill(text, str(self.out))
         write_draft(self.out, text)
         say(text.rstrip())
-        say(f"written   {self.out}: look at it, then warpdribble simulate {self.out} --repeat 5")
+        say(f"written   {self.out}: look at it")
+        say(f"next      warpdribble simulate {self.out}{' --repeat 5' if one.cyclic else ''}")
+        if one.cyclic or one.contact:
+            say(f"          warpdribble learn {self.out} --out {Path('runs', self.out.stem)}")
         return 0
 
 
@@ -107,3 +117,13 @@ class SkillGroup:
 
     def run(self) -> int:
         return self.do.run()
+
+
+def _way(cycle: Cycle) -> str:
+    """Where a cycle leads, as the player faces: "1.78 m ahead, turning 11 degrees left"."""
+    ahead, left = cycle.way
+    steps = ((ahead, "ahead", "back"), (left, "to the left", "to the right"))
+    parts = [f"{abs(way):.2f} m {to if way > 0.0 else fro}" for way, to, fro in steps if abs(way) >= 0.005]
+    turn = round(math.degrees(cycle.turn))
+    parts += [f"turning {abs(turn)} degrees {'left' if turn > 0 else 'right'}"] if turn else []
+    return ", ".join(parts) or "stays in place"

@@ -33,9 +33,9 @@ def draft(
     MappingError (ValueErrors)."""
     motion, _ = read_clip(clip, **reading)
     wanted = read_mapping(mapping) if mapping else find_mapping(motion)
-    cyclic, others = False, []
+    cyclic, others, searched = False, [], frames is None and not whole
     if frames is None:
-        found = [] if whole else [c for c in find_cycles(motion, wanted) if c.pose_gap < GOOD]
+        found = [c for c in find_cycles(motion, wanted) if c.pose_gap < GOOD] if searched else []
         frames = (found[0].first, found[0].last) if found else (0, motion.frame_count - 1)
         cyclic, others = bool(found), found[1:5]
     first, last = frames[0], motion.frame_count - 1 if frames[1] == -1 else frames[1]
@@ -57,6 +57,8 @@ def draft(
     if mapping:
         lines.append(f'mapping = "{_quoted(mapping)}"')
     lines += _as_read(reading)
+    if searched and not cyclic:
+        lines.append(f"# all of it, once: no part ends within {100 * GOOD:.0f} cm of how it begins")
     for c in others:
         lines.append(f"# also a cycle: frames = [{c.first}, {c.last}], ends {100 * c.pose_gap:.1f} cm apart")
     if ball is None:

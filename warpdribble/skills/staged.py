@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..clips import ClipError, data_folder
+from ..clips.data import set_of
 from ..sims.ball.ball import (
     Ball,
     ball_path,
@@ -62,7 +63,7 @@ def _found(skill: Skill, key: str, data: str | Path | None) -> Path:
     for place in places:
         if place.exists():
             return place
-    raise SkillError(skill.source, key, f"no file '{own}' in {folder}", "fetch")
+    raise SkillError(skill.source, key, f"no file '{own}' in {folder}", set_of(own))
 
 
 def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> StagedSkill:

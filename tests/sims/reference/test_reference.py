@@ -4,7 +4,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from warpdribble.sims import Model
-from warpdribble.sims.reference.reference import Reference, close_cycle, difference, integrate, resample_q
+from warpdribble.sims.reference.reference import (
+    Cycle,
+    Reference,
+    close_cycle,
+    difference,
+    integrate,
+    resample_q,
+)
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +136,16 @@ def test_resampled_rows_have_unit_quaternions(player):
     for k in player.quaternions():
         assert np.allclose(np.linalg.norm(rows[:, k : k + 4], axis=1), 1.0)
     assert np.allclose(rows[0], walk(player).joint_q[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("faces", [0.0, 1.0, -2.0, 3.1])
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+def test_the_way_of_a_cycle_is_seen_from_the_player(player, faces, turn):
+    """Two metres ahead and half a metre to the right, whichever way it faces in the world, hips swaying."""
+    share = np.linspace(0.0, 1.0, 101)
+    joint_q = np.tile(player.start_q, (101, 1))
+    yaw = faces + turn * share + 0.3 * np.sin(2.0 * np.pi * share)
+    joint_q[:, 3:7] = Rotation.from_rotvec(yaw[:, None] * [0.0, 0.0, 1.0]).as_quat()
+    ahead, left = np.array([np.cos(faces), np.sin(faces)]), np.array([-np.sin(faces), np.cos(faces)])
+    cycle = Cycle(Reference(joint_q, player.timestep), turn, tuple(2.0 * ahead - 0.5 * left))
+    assert cycle.way == pytest.approx((2.0, -0.5), abs=1e-9)

@@ -1,8 +1,10 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from warpdribble.cli import main
-from warpdribble.sims import Model
+from warpdribble.sims import Cycle, Model
 from warpdribble.sims.model import gaps, pose
 from warpdribble.skills.draft import draft
 from warpdribble.skills.skill import SkillError, is_skill, parse_skill, read_skill, skill_names
@@ -131,10 +133,42 @@ def test_the_commands(capsys, tmp_path, cmu_clip):
     assert main(["skill", "show", str(tmp_path / "none.toml")]) == 2
     assert "no such file" in capsys.readouterr().err
     assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.toml")]) == 0
+    said = capsys.readouterr().out
+    assert f"simulate {tmp_path / 'd.toml'} --repeat 5" in said
+    assert f"learn {tmp_path / 'd.toml'} --out {Path('runs', 'd')}" in said
     drafted = read_skill(tmp_path / "d.toml")
     assert (drafted.name, drafted.frames, drafted.cyclic) == ("clip", (0, 120), True)
     assert main(["skill", "draft", str(cmu_clip), "--out", str(tmp_path / "d.txt")]) == 2
     assert "a skill is a .toml file" in capsys.readouterr().err
+
+
+def test_a_draft_that_was_edited_is_not_lost(capsys, tmp_path, cmu_clip):
+    out = tmp_path / "d.toml"
+    out.write_text("mine")
+    assert main(["skill", "draft", str(cmu_clip), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert f"{out}: is there already; give another name, or --overwrite" in said and out.read_text() == "mine"
+    assert main(["skill", "draft", str(cmu_clip), "--out", str(out), "--overwrite"]) == 0
+    assert read_skill(out).name == "clip"
+
+
+def test_a_skill_says_where_it_leads_as_the_player_faces(capsys, tmp_path, cmu_clip, monkeypatch):
+    monkeypatch.setattr(Cycle, "way", (1.5, -0.25))
+    text = f'name = "x"\nclip = "{cmu_clip}"\ncyclic = true\nball = false\n'
+    (tmp_path / "x.toml").write_text(text)
+    assert main(["skill", "show", str(tmp_path / "x.toml")]) == 0
+    assert "per cycle: 1.50 m ahead, 0.25 m to the right\n" in capsys.readouterr().out
+
+
+def test_skills_that_are_not_here_name_what_to_fetch(capsys, tmp_path, monkeypatch):
+    monkeypatch.setenv("WARPDRIBBLE_DATA", str(tmp_path))
+    assert main(["skill", "list"]) == 0
+    said = capsys.readouterr().out
+    clips = [read_skill(name).clip for name in skill_names() if read_skill(name).clip]
+    assert said.count("(not here: warpdribble fetch ") == len(clips)
+    for folder, name in (("cmu", "cmu"), ("ballplay_m", "ballplay")):
+        lines = [line for line in said.splitlines() if f" {folder}/" in line]
+        assert lines and all(line.endswith(f"warpdribble fetch {name})") for line in lines)
 
 
 def test_motion_commands(capsys, cmu_clip):
