@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import platform
 import sys
 import time
 from dataclasses import asdict, dataclass, field
@@ -14,6 +13,7 @@ import numpy as np
 import tyro
 
 from ..commands.console import quiet_warp
+from ..commands.info import processor
 from ..sims import Simulation
 from ..sims.worlds.simulation import SWEEPS
 from .mjwarp import MuJoCoWarp
@@ -87,17 +87,6 @@ class Result:
 
 
 COMMANDS: dict[str, Any] = {"step": Step, "solve": Solve, "reset": Reset}
-
-
-def processor() -> str:
-    """The processor's name."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def step(options: Step) -> Result:

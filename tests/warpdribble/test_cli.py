@@ -4,8 +4,12 @@ import sys
 from pathlib import Path
 
 import pytest
+import warp as wp
 
 from warpdribble.cli import main
+from warpdribble.commands import console
+from warpdribble.commands.console import _has_card
+from warpdribble.commands.output import Outputs, check_outputs
 from warpdribble.takes.take import validate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,6 +71,79 @@ def test_unwritable_output(capsys, tmp_path, name):
     (tmp_path / "folder.usda").mkdir()
     said = refused(capsys, tmp_path, "demo", "--out", tmp_path / name)
     assert name in said
+
+
+@pytest.mark.parametrize("name", ["t.usda", "t.physics.usda", "t.png", "t.plots.png", "t.html"])
+def test_files_that_are_there_are_left_alone(capsys, tmp_path, name):
+    """All that a command would write: the take, its layers, and what goes beside it."""
+    (tmp_path / name).write_text("mine")
+    for command in (("demo",), ("simulate", "waist"), ("export", "waist")):
+        said = refused(capsys, tmp_path, *command, "--out", tmp_path / "t.usda")
+        assert f"{name}: is there already; give another name, or --overwrite to replace it" in said
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_what_is_not_written_is_not_in_the_way(tmp_path):
+    (tmp_path / "t.html").write_text("mine")
+    (tmp_path / "t.physics.usda").write_text("mine")
+    check_outputs(Outputs(out=tmp_path / "t.usdc", html=False))
+    check_outputs(Outputs(out=tmp_path / "t.usdc", overwrite=True))
+
+
+@pytest.mark.parametrize(
+    "given",
+    [("--frames", "0", "-1"), ("--repair", "toes"), ("--up", "z"), ("--rate", "60"), ("--drop-positions",),
+     ("--mapping", "cmu")],
+)  # fmt: skip
+def test_what_a_skill_s_file_says_is_refused(capsys, tmp_path, given):
+    said = refused(capsys, tmp_path, "simulate", "waist", *given, "--out", tmp_path / "t.usdc")
+    assert f"{given[0]}: 'waist' is a skill, whose file says it" in said
+
+
+def test_a_machine_without_cuda_is_silent_and_says_so_where_cuda_is_asked_for(tmp_path):
+    """In fresh processes, where Warp begins and its driver is looked for."""
+    if wp.is_cuda_available() or _has_card():
+        pytest.skip("a card is here")
+    command = [sys.executable, "-m", "warpdribble", "simulate", "no.bvh", "--out", str(tmp_path / "t.usdc")]
+    calm = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert calm.stderr == "warpdribble: no.bvh: no such file\n"
+    asked = subprocess.run(
+        [*command, "--device", "cuda"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert asked.returncode == 2 and asked.stderr.count("\n") == 1
+    assert "--device cuda: no device 'cuda' here; there are: cpu (" in asked.stderr and "CUDA" in asked.stderr
+
+
+@pytest.mark.parametrize("card", [False, True])
+def test_what_warp_says_of_cuda_is_passed_on_where_it_matters(capsys, monkeypatch, card):
+    """Native code writes it to the file behind stderr. That a driver is too old always matters."""
+    told = b"Warp CUDA warning: Could not find or load the NVIDIA CUDA driver.\nWarp CUDA error: too old\n"
+    monkeypatch.setattr(wp, "init", lambda: os.write(2, told))
+    monkeypatch.setattr(console, "_has_card", lambda: card)
+    said = console.warp_begins.__wrapped__()
+    assert said == "Could not find or load the NVIDIA CUDA driver. too old"
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "Warp CUDA error: too old" and len(lines) == 1 + card
+
+
+def test_info_says_what_a_report_needs(capsys, monkeypatch, tmp_path):
+    from importlib.metadata import version
+
+    monkeypatch.setenv("WARPDRIBBLE_DATA", str(tmp_path))
+    assert main(["info"]) == 0
+    said = capsys.readouterr().out
+    for word in (
+        f"warp-lang {version('warp-lang')}",
+        f"numpy {version('numpy')}",
+        f"{os.cpu_count()} threads",
+        "worlds in a register",
+        str(wp.config.kernel_cache_dir),
+        f"data      {tmp_path} (0 MiB)",
+        "cmu: 0 of 20 (warpdribble fetch cmu)",
+    ):
+        assert word in said
+    if not wp.is_cuda_available():
+        assert "device    cpu alone" in said
 
 
 def test_unsupported_model_element(capsys, tmp_path, cmu_clip):

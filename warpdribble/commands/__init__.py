@@ -10,6 +10,7 @@ from .demo import Demo
 from .evaluate import Evaluate
 from .export import Export
 from .fetch import Fetch
+from .info import Info
 from .learn import Learn
 from .motion import MotionGroup
 from .simulate import Simulate
@@ -32,6 +33,7 @@ COMMANDS: dict[str, type[Command]] = {
     "learn": Learn,
     "evaluate": Evaluate,
     "export": Export,
+    "info": Info,
 }
 
 __all__ = ["COMMANDS", "Command"]

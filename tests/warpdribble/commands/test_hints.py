@@ -81,9 +81,10 @@ WRONG = {
     "no skill": (lambda a: read_skill("moonwalk"), ""),
     "no skill file": (lambda a: read_skill(a.tmp_path / "none.toml"), ""),
     "no key": (lambda a: a.mine('authored = "waist"\nspeed = 3'), ""),
-    "no recording": (
-        lambda a: stage_skill(a.player, a.mine('clip = "none.bvh"'), a.tmp_path),
-        "warpdribble fetch gets the recordings",
+    "no recording": (lambda a: stage_skill(a.player, a.mine('clip = "none.bvh"'), a.tmp_path), ""),
+    "not fetched": (
+        lambda a: stage_skill(a.player, read_skill("run-dribble"), a.tmp_path),
+        "warpdribble fetch ballplay brings it",
     ),
     "no authored": (lambda a: stage_skill(a.player, a.mine('authored = "moon"')), ""),
     "skill's frames": (lambda a: stage_skill(a.player, a.mine(f'clip = "{a.clip}"\nframes = [0, 999]')), ""),
