@@ -47,6 +47,14 @@ class Trials:
     heading at worst; NaN for none"""
 
 
+def about_trials(count: int, length: str, speed_noise: float, disturbance: Disturbance) -> str:
+    """A line for a person: what trials as `run_trials` makes them have to stand. length: as "20 cycles"."""
+    stands = disturbance.about
+    parts = [*([stands] if stands else []), *([f"starts {speed_noise:g} rad/s off"] if speed_noise else [])]
+    how = "harder than usual: " if stands else ""
+    return f"{count} trials of {length} ({how}{', '.join(parts) or 'undisturbed'})"
+
+
 def run_trials(
     task: Locomotion,
     controller: Controller,

@@ -139,4 +139,5 @@ STAGE = Stage(
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),
+    check=samcon.about_check,
 )

@@ -22,7 +22,7 @@ import numpy as np
 from ...sims.errors import InputError
 from ..ball.optimised import Optimised
 from ..choose import RandomWalk
-from ..evaluate.trials import record_starts, run_trials
+from ..evaluate.trials import about_trials, record_starts, run_trials
 from ..policies.batch import Batch, advantages
 from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
@@ -392,6 +392,11 @@ def learned(context: Context, arrays: Arrays) -> Controller:
     return NetworkPolicy.of(arrays)
 
 
+def about_check(c: PpoConfig) -> str:
+    """What `Ppo.check` lets policies stand, for a person."""
+    return about_trials(c.trials, f"{c.check_seconds:g} s", c.speed_noise, c.disturbance)
+
+
 STAGE = Stage(
     name="policy",
     about="a network that keeps the ball, whatever disturbs it",
@@ -403,5 +408,6 @@ STAGE = Stage(
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),
     packages=("torch",),
+    check=about_check,
     save_iterations=1000,
 )

@@ -23,7 +23,7 @@ import numpy as np
 from ...sims.errors import InputError
 from ...sims.worlds.cores import usable_cores
 from ..choose import RandomWalk
-from ..evaluate.trials import Trials, record_starts, run_trials
+from ..evaluate.trials import Trials, about_trials, record_starts, run_trials
 from ..policies.em import Moments, added, descendants, improve, select
 from ..policies.linear import Explore, LinearPolicy
 from ..rollout import Rollout
@@ -340,6 +340,11 @@ def _try(
 # ------------------------------------------------------------------------------------------------- stage
 
 
+def about_check(c: SamconConfig) -> str:
+    """What `Samcon.check` lets policies stand, for a person."""
+    return about_trials(c.trials, f"{c.check_cycles:g} cycles", c.speed_noise, c.disturbance)
+
+
 def make(context: Context) -> Samcon:
     """The learner of a graph, in worlds shared out among the workers."""
     c: SamconConfig = context.config
@@ -383,4 +388,5 @@ STAGE = Stage(
     make=make,
     controller=learned,
     task=locomotion_task,
+    check=about_check,
 )

@@ -97,6 +97,9 @@ class Stage:
     """only for a skill in which somebody plays with one"""
     packages: tuple[str, ...] = ()
     """that learning needs, beyond what is always there; they come with the extra `learn`"""
+    check: Callable[[Any], str] | None = None
+    """a line for a person: what policies are tried in, from the parameters, where a `score` of 1 is the best
+    that there is; None for others"""
     save_iterations: int = 1
     save_seconds: float = 30.0
     """A checkpoint is written after so many iterations, or so much time, whichever comes first."""

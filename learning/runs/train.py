@@ -23,6 +23,8 @@ class Trained:
     """in the checkpoint"""
     has_events: bool
     """TensorBoard's files are there too."""
+    config: Any
+    """parameters of the learner"""
 
 
 def train(
@@ -52,13 +54,14 @@ def train(
             made(learner, config)
         config = replace(config, iterations=max(config.iterations, learner.iteration))
         folder.begin(config, context.needs)
-        return _train(folder, stage, learner, seconds, progress)
+        return _train(folder, stage, learner, config, seconds, progress)
 
 
 def _train(
     folder: StageFolder,
     stage: Stage,
     learner: Learner,
+    config: Any,
     seconds: float,
     progress: Callable[[Report], object] | None,
 ) -> Trained:
@@ -89,4 +92,4 @@ def _train(
         if log is not None:
             with contextlib.suppress(OSError):
                 log.close()
-    return Trained(saved, log is None or log.has_events)
+    return Trained(saved, log is None or log.has_events, config)

@@ -33,6 +33,16 @@ class Disturbance:
     hands_time: float = 0.25
     """[s] that such a force lasts, on average"""
 
+    @property
+    def about(self) -> str:
+        """A line for a person, as "pushes up to 400 N, arms 0.2 rad off"; "" for none."""
+        parts = {
+            f"pushes up to {self.push:g} N": self.push,
+            f"arms {self.arms:g} rad off": self.arms,
+            f"up to {self.hands:g} N on each hand": self.hands,
+        }
+        return ", ".join(text for text, size in parts.items() if size)
+
 
 CALM = Disturbance()
 

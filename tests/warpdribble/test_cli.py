@@ -135,7 +135,7 @@ def test_info_says_what_a_report_needs(capsys, monkeypatch, tmp_path):
     for word in (
         f"warp-lang {version('warp-lang')}",
         f"numpy {version('numpy')}",
-        f"{os.cpu_count()} threads",
+        f"of {os.cpu_count()} threads to use",
         "worlds in a register",
         str(wp.config.kernel_cache_dir),
         f"data      {tmp_path} (0 MiB)",

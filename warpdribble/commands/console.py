@@ -181,13 +181,13 @@ def check_range(option: str, value: float, least: float, most: float) -> None:
 
 
 def check_new(paths: Iterable[Path], overwrite: bool) -> None:
-    """Raise InputError for files that are there, and would be lost, unless they may be."""
-    from ..sims.errors import InputError
-
+    """Raise ValueError for files that are there, and would be lost, unless they may be."""
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
         more = f", and {len(there) - 1} more" if len(there) > 1 else ""
-        raise InputError(f"is there already{more}", there[0], "overwrite")
+        raise ValueError(
+            f"{there[0]}: is there already{more}; give another name, or --overwrite to replace it"
+        )
 
 
 def without_nan(value: Any) -> Any:

@@ -6,7 +6,6 @@ from ..sims.errors import InputError
 
 HINTS = {
     "out": "give another --out",
-    "overwrite": "give another name, or --overwrite to replace it",
     "frames": "give other --frames",
     "cmu": "warpdribble fetch cmu brings it",
     "ballplay": "warpdribble fetch ballplay brings it",
@@ -15,8 +14,6 @@ HINTS = {
     "needs": "learn that one first, with --stage",
     "stage": "give another --stage",
     "run": "give a folder that warpdribble learn wrote",
-    "draft": "warpdribble skill draft CLIP --out SKILL.toml makes one, or say the part with --frames, and "
-    "--cyclic where it repeats",
     "closed": "with --cyclic its ends are made to meet, warpdribble skill draft CLIP finds where they do",
     "cyclic": "take one of those that warpdribble skill list says are",
     "root": "try --root tracked, or another clip",

@@ -32,14 +32,15 @@ def _lines() -> Iterator[tuple[str, str]]:
     from .. import __version__
     from ..clips.data import SETS, data_folder, entries
     from ..sims.worlds.batch import widest_lanes
+    from ..sims.worlds.cores import usable_cores
 
     quiet_warp()
     yield "version", f"warpdribble {__version__} in {Path(__file__).parents[1]}"
     yield "python", f"{platform.python_version()} ({sys.executable})"
     yield "system", platform.platform()
     yield "packages", ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
-    lanes, threads = widest_lanes(), os.cpu_count() or 1
-    yield "processor", f"{processor()}: {threads} threads, {lanes} worlds in a register"
+    cores = f"{usable_cores()} of {os.cpu_count()} threads to use"
+    yield "processor", f"{processor()}: {cores}, {widest_lanes()} worlds in a register"
     for device in warp.get_devices():
         if device.is_cuda:
             yield "device", f"{device.alias}: {device.name}, {device.total_memory / 2**30:.0f} GiB"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
+from .clip_input import WHOLE, refuse_for_skill
 from .console import bar, check_range, compiling, find_device, say, warmed
 
 if TYPE_CHECKING:
@@ -24,8 +25,9 @@ class Learn:
     """Learn a policy for a skill, on the CPU or a GPU. Stopped at any moment, the same command goes on."""
 
     skill: Positional[str]
-    """Name of a skill (warpdribble skill list), a skill's .toml file, or a recorded clip. What is not cyclic
-    happens once, its root held by virtual forces; only the stage ball is for that."""
+    """Name of a skill (warpdribble skill list), its .toml file (warpdribble skill draft makes one), or a
+    recorded clip, with --frames. What is not cyclic happens once, its root held by virtual forces; only the
+    stage ball is for that."""
     out: Path
     """Folder of the run."""
     frames: tuple[int, int] | None = None
@@ -116,10 +118,14 @@ class Learn:
         from ..skills import clip_skill, is_skill, read_skill
 
         if is_skill(self.skill):
-            if self.frames or self.cyclic:
-                raise ValueError(f"--frames and --cyclic: '{self.skill}' is a skill, whose file says it")
+            refuse_for_skill(self, ("frames", "cyclic"), self.skill)
             return read_skill(self.skill)
-        return clip_skill(self.skill, self.frames or (0, -1), cyclic=self.cyclic)
+        if not (self.frames or self.cyclic) and Path(self.skill).is_file():
+            raise ValueError(
+                f"{self.skill}: is a recording; a skill says which part of it is learned: warpdribble skill "
+                "draft CLIP --out SKILL.toml makes one; or give --frames, and --cyclic where they repeat"
+            )
+        return clip_skill(self.skill, self.frames or WHOLE, cyclic=self.cyclic)
 
     def _graph(self, one: Skill) -> Any:
         from ..skills import skill_graph
@@ -189,13 +195,18 @@ class Learn:
 
         folder = run.stage(stage).path
         if rows := read_rows(folder):
-            tried = [row["survived"] for row in rows if math.isfinite(row.get("survived", math.nan))]
-            share = f", {100.0 * tried[-1]:.0f} % of the last trials survived" if tried else ""
+            found = ""
             if "cycles" in rows[-1]:
-                share = (
+                found = (
                     f": {rows[-1]['cycles']:.0f} cycles, fingers {rows[-1]['fingers']:.1f} cm from the ball"
                 )
-            say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{share}")
+            say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{found}")
+            tried = [row for row in rows if math.isfinite(row.get("survived", math.nan))]
+            if tried:
+                how = f", in {stage.check(trained.config)}" if stage.check else ""
+                say(f"tried     the last policy{how}: {100.0 * tried[-1]['survived']:.0f} % survived")
+                score = f", score {tried[-1]['score']:.2f}{BEST}" if stage.check else ""
+                say(f"kept      the best policy of all tries{score}")
             if "samples_per_second" in rows[-1]:
                 rate = sum(row["samples_per_second"] for row in rows) / len(rows)
                 mean = {key: sum(row[key] for row in rows) / len(rows) for key in BESIDE if key in rows[0]}
@@ -205,6 +216,8 @@ class Learn:
             say("          no files for TensorBoard: pip install tensorboard, and the same again")
 
 
+BEST = " (1: all of the time survived, at no cost)"
+"""What a score, as `Samcon.check` gives it, means to a person."""
 BESIDE = {"outside": "outside the simulation", "learning": "learning beside the simulation"}
 
 
@@ -219,7 +232,7 @@ class Shown:
         """Show an iteration."""
         survived, cost = getattr(report, "survived", math.nan), getattr(report, "cost", math.nan)
         self.tried = survived if math.isfinite(survived) else self.tried
-        parts = [f"{100.0 * self.tried:.0f} % survived"] if math.isfinite(self.tried) else []
+        parts = [f"{100.0 * self.tried:.0f} % of the trials survived"] if math.isfinite(self.tried) else []
         if (cycles := getattr(report, "cycles", None)) is not None:
             parts = [
                 f"{cycles} cycles",

@@ -53,6 +53,6 @@ def skill_graph(skill: Skill, data: str | Path | None = None) -> tuple[ControlGr
         return cyclic_graph(player, cycle, player.roles.both("feet"), skill.name, one.ball), one.notes
     if one.ball is None:
         reason = f"the skill '{skill.name}' is not cyclic, and no ball shows: locomotion is learned on cycles"
-        raise InputError(reason, hint="cyclic")
+        raise InputError(reason, hint="closed" if skill.is_clip else "cyclic")
     notes = (*one.notes, "not cyclic: virtual forces hold the root, arms and ball are simulated")
     return tracked_graph(player, reference, ball=one.ball), notes
