@@ -1,19 +1,14 @@
-"use strict";
-// Plays a take: what is said in JSON, the arrays it points into as one base64 block, drawn with three.js.
+// Plays a take: its JSON, figures and a camera, the panel, keys, and addresses that name a moment.
 (() => {
   const $ = (id) => document.getElementById(id);
   const take = JSON.parse($("take").textContent);
-  const bytes = Uint8Array.from(atob($("data").textContent.trim()), (c) => c.charCodeAt(0));
-  const kinds = { f4: Float32Array, u4: Uint32Array, u2: Uint16Array, i2: Int16Array, i1: Int8Array, u1: Uint8Array };
-  const array = ({ at, count, kind }) => new kinds[kind](bytes.buffer, at, count);
   $("title").textContent = take.title;
-
-  const trouble = (text) => { $("trouble").textContent = text; $("trouble").hidden = false; };
   let renderer;
   try {
     renderer = new THREE.WebGLRenderer({ canvas: $("view"), antialias: true });
   } catch (error) {
-    trouble("This browser shows no WebGL, which the replay needs.");
+    $("trouble").textContent = "This browser shows no WebGL, which the replay needs.";
+    $("trouble").hidden = false;
     return;
   }
   renderer.shadowMap.enabled = true;
@@ -32,178 +27,163 @@
   sun.shadow.normalBias = 0.01;
   scene.add(sun, sun.target);
 
-  const { frames, bodies, worlds } = take;
-  const motion = array(take.motion.places), turned = array(take.motion.turns);
-  const offsets = take.offsets;
+  const end = Math.max(take.frames - 1, 0) / take.fps, GHOSTS = take.ghost ? ["", "there", "here"] : [""];
+  const who = figures(take, scene), spot = new THREE.Vector3();
+  let time = 0, playing = true, stale = true, jumped = false, last = null, ghost = "";
+  const touch = () => { stale = true; };
+  const view = viewer(take, $("view"), who, touch);
 
-  function geometry(mesh) {
-    const made = new THREE.BufferGeometry();
-    const packed = array(mesh.points), points = new Float32Array(packed.length);
-    for (let i = 0; i < points.length; i++) {
-      points[i] = mesh.low[i % 3] + (packed[i] / 65535) * mesh.size[i % 3];
+  // ---------------------------------------------------------------------------------------- what can be done
+  const pad = (text, longest) => text.padStart(longest.length, "\u2007"); // a space as wide as a figure
+  function seek(moment) {
+    time = Math.min(Math.max(moment, 0), end);
+    $("bar").value = time;
+    $("seconds").textContent = pad(time.toFixed(2), end.toFixed(2));
+    $("frame").textContent = pad(String(Math.round(time * take.fps)), String(take.frames - 1));
+    jumped = true;
+    touch();
+  }
+  function play(on) {
+    playing = on;
+    $("play").textContent = on ? "Pause" : "Play";
+    touch();
+  }
+  function halt(moment) { play(false); seek(moment); mark(); }
+  const step = (count) => halt((Math.round(time * take.fps) + count) / take.fps);
+  function haunt(how) {
+    ghost = how;
+    $("ghost").setAttribute("aria-pressed", how !== "");
+    $("ghost").textContent = { "": "Ghost", there: "Ghost: its place", here: "Ghost: over player" }[how];
+    touch();
+  }
+  function nextGhost() { haunt(GHOSTS[(GHOSTS.indexOf(ghost) + 1) % GHOSTS.length]); mark(); }
+  function follow(on) {
+    view.follow = on;
+    $("follow").setAttribute("aria-pressed", view.follow);
+  }
+  function reset() { follow(true); view.begin(); }
+  function faster(by) {
+    const speed = $("speed"), to = speed.selectedIndex + by;
+    if (speed.options[to]) speed.selectedIndex = to;
+  }
+  function ask() {
+    $("help").hidden = !$("help").hidden;
+    $("ask").setAttribute("aria-pressed", !$("help").hidden);
+  }
+
+  // ------------------------------------------------------------------------------ addresses: #t=3.2&ghost=here
+  function mark() {
+    const said = [...(playing ? [] : [`t=${+time.toFixed(3)}`]), ...(ghost ? [`ghost=${ghost}`] : [])];
+    try { history.replaceState(null, "", `#${said.join("&")}`); } catch (error) { /* a page in a frame may not */ }
+  }
+  function heed() {
+    const said = new URLSearchParams(location.hash.slice(1));
+    const moment = Number(said.get("t") ?? NaN);
+    if (Number.isFinite(moment)) {
+      play(false);
+      seek(moment);
     }
-    made.setAttribute("position", new THREE.BufferAttribute(points, 3));
-    made.setAttribute("normal", new THREE.BufferAttribute(array(mesh.normals), 3, true));
-    made.setIndex(new THREE.BufferAttribute(array(mesh.faces), 1));
-    return made;
+    if (said.has("ghost") && take.ghost) haunt(said.get("ghost") === "here" ? "here" : "there");
+    if (said.has("speed")) $("speed").value = said.get("speed");
+    if (!$("speed").value) $("speed").value = "1";
+    if (said.has("follow")) follow(said.get("follow") !== "0");
+    who.pose(time, ghost);
+    view.go();
+    if (["front", "left", "behind", "above"].includes(said.get("view"))) view.look(said.get("view"));
+    if (said.has("help") === $("help").hidden) ask();
   }
-  const paint = (colour, more) => new THREE.MeshStandardMaterial({
-    color: new THREE.Color().setRGB(...colour, "srgb-linear"), roughness: 0.7, ...more });
+  addEventListener("hashchange", heed);
 
-  const moving = [];
-  for (const mesh of take.meshes) {
-    const still = mesh.body < 0;
-    const made = new THREE.InstancedMesh(geometry(mesh), paint(mesh.colour), still ? 1 : worlds);
-    made.frustumCulled = false;
-    made.castShadow = !still;
-    made.receiveShadow = true;
-    if (still) made.setMatrixAt(0, new THREE.Matrix4());
-    else moving.push([made, mesh.body]);
-    scene.add(made);
+  // ------------------------------------------------------------------------------------------ panel and keys
+  const press = { play: () => { play(!playing); mark(); }, back: () => step(-1), on: () => step(1),
+    follow: () => follow(!view.follow), ghost: nextGhost, reset, ask };
+  for (const [id, act] of Object.entries(press)) {
+    $(id).onclick = (event) => { act(); if (event.detail) $(id).blur(); };
   }
-
-  const skinned = [];
-  if (take.skin) {
-    const inverse = take.skin.inverse.map((m) => new THREE.Matrix4().fromArray(m));
-    for (const part of take.skin.parts) {
-      const shape = geometry(part);
-      shape.setAttribute("skinIndex", new THREE.BufferAttribute(array(part.bones), 4));
-      shape.setAttribute("skinWeight", new THREE.BufferAttribute(array(part.weights), 4, true));
-      for (let world = 0; world < worlds; world++) {
-        const bones = inverse.map(() => new THREE.Bone());
-        bones.forEach((bone) => { bone.matrixAutoUpdate = false; });
-        const made = new THREE.SkinnedMesh(shape, paint(part.colour));
-        made.bind(new THREE.Skeleton(bones, inverse), new THREE.Matrix4());
-        made.frustumCulled = false;
-        made.castShadow = made.receiveShadow = true;
-        scene.add(made);
-        skinned.push([bones, world]);
-      }
-    }
-  }
-
-  const a = new THREE.Vector3(), b = new THREE.Vector3(), p = new THREE.Quaternion(), q = new THREE.Quaternion();
-  const one = new THREE.Vector3(1, 1, 1), matrices = [];
-  for (let i = 0; i < worlds * bodies; i++) matrices.push(new THREE.Matrix4());
-  function read(world, frame, body, place, turn) {
-    const row = (world * frames + frame) * bodies + body, { low, size } = take.motion;
-    place.set(low[0] + motion[3 * row] / 65535 * size[0], low[1] + motion[3 * row + 1] / 65535 * size[1],
-      low[2] + motion[3 * row + 2] / 65535 * size[2]);
-    turn.set(turned[4 * row], turned[4 * row + 1], turned[4 * row + 2], turned[4 * row + 3]).normalize();
-  }
-  function pose(time) {
-    const at = Math.min(Math.max(time * take.fps, 0), frames - 1);
-    const first = Math.min(Math.floor(at), Math.max(frames - 2, 0)), next = Math.min(first + 1, frames - 1);
-    for (let world = 0; world < worlds; world++) {
-      for (let body = 0; body < bodies; body++) {
-        read(world, first, body, a, p);
-        read(world, next, body, b, q);
-        a.lerp(b, at - first);
-        p.slerp(q, at - first);
-        a.x += offsets[world][0];
-        a.y += offsets[world][1];
-        matrices[world * bodies + body].compose(a, p, one);
-      }
-    }
-    for (const [mesh, body] of moving) {
-      for (let world = 0; world < worlds; world++) mesh.setMatrixAt(world, matrices[world * bodies + body]);
-      mesh.instanceMatrix.needsUpdate = true;
-    }
-    for (const [bones, world] of skinned) {
-      bones.forEach((bone, i) => bone.matrixWorld.copy(matrices[world * bodies + i]));
-    }
-    a.setFromMatrixPosition(matrices[Math.max(take.root, 0)]);
-    return a;
-  }
-
-  const camera = new THREE.PerspectiveCamera(32, 1, 0.05, 200);
-  camera.up.set(0, 0, 1);
-  const start = pose(0).clone();
-  const middle = worlds > 1 ? new THREE.Vector3(0, 0, 0.7) : new THREE.Vector3(start.x, start.y, 0.72);
-  const back = (worlds > 1 ? 2.4 : 1) * (4.2 + 0.9 * (worlds > 1 ? take.reach - 2 : 0));
-  camera.position.copy(middle).add(new THREE.Vector3(0.80, -0.55, 0.25).normalize().multiplyScalar(back));
-  const orbit = new THREE.OrbitControls(camera, renderer.domElement);
-  orbit.target.copy(middle);
-  orbit.maxPolarAngle = 0.52 * Math.PI;
-  orbit.update();
-
-  let time = 0, playing = true, last = null;
-  const end = Math.max(frames - 1, 0) / take.fps, bar = $("bar");
-  const followed = start.clone();
-  bar.max = end || 1;
-  function set(moment) {
-    time = moment;
-    bar.value = time;
-    $("time").textContent = `${time.toFixed(2)} / ${end.toFixed(2)} s`;
-  }
-  function toggle() {
-    playing = !playing;
-    $("play").textContent = playing ? "Pause" : "Play";
-  }
-  $("play").onclick = toggle;
-  bar.oninput = () => { if (playing) toggle(); set(Number(bar.value)); };
+  $("speed").onchange = () => $("speed").blur();
+  $("bar").max = end || 1;
+  $("bar").oninput = () => halt(Number($("bar").value));
+  const keys = { " ": press.play, f: press.follow, g: nextGhost, r: reset, "?": ask,
+    Home: () => halt(0), End: () => halt(end),
+    "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1),
+    1: () => view.look("front"), 2: () => view.look("left"), 3: () => view.look("behind"), 4: () => view.look("above"),
+    Escape: () => { if (!$("help").hidden) ask(); } };
   addEventListener("keydown", (event) => {
-    if (event.target.tagName === "SELECT") return;
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (event.key === " ") toggle();
-    else if (event.key === "f") $("follow").checked = !$("follow").checked;
-    else if (step) { if (playing) toggle(); set(Math.min(Math.max(time + step / take.fps, 0), end)); }
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
+    if (event.target.tagName === "BUTTON" && [" ", "Enter"].includes(event.key)) return;
+    const frames = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (frames) step(event.shiftKey ? 10 * frames : frames);
+    else if (keys[event.key]) keys[event.key]();
     else return;
     event.preventDefault();
   });
+  for (const node of document.querySelectorAll(".ghost")) node.hidden = !take.ghost;
+  $("follow").hidden = take.worlds > 1;
+  $("time").title = `of ${end.toFixed(2)} s, ${take.frames - 1} frames at ${+take.fps.toFixed(2)} a second`;
 
+  const names = Object.keys(take.contacts), ROW = 14, THUMB = 8;
+  for (const name of names) $("names").append(Object.assign(document.createElement("div"), { textContent: name }));
   function strips() {
-    const names = Object.keys(take.contacts), canvas = $("strips"), left = 120;
-    const width = canvas.clientWidth, ratio = devicePixelRatio || 1, row = 14;
-    canvas.style.height = `${row * names.length}px`;
+    const canvas = $("strips"), ratio = devicePixelRatio || 1;
+    canvas.style.height = `${ROW * names.length}px`;
+    const width = canvas.clientWidth;
     canvas.width = width * ratio;
-    canvas.height = row * names.length * ratio;
-    const draw = canvas.getContext("2d");
+    canvas.height = ROW * names.length * ratio;
+    const draw = canvas.getContext("2d"), scale = (width - 2 * THUMB) / Math.max(end, 1e-9);
     draw.scale(ratio, ratio);
-    draw.font = "11px system-ui, sans-serif";
-    draw.textBaseline = "middle";
     names.forEach((name, i) => {
-      draw.fillStyle = "#22272d";
-      draw.fillText(name, 0, row * (i + 0.5));
+      draw.fillStyle = "#e3e6e9";
+      draw.fillRect(THUMB, ROW * i + 3, width - 2 * THUMB, ROW - 6);
+      draw.fillStyle = "#4a5560";
       for (const [from, to] of take.contacts[name]) {
-        const scale = (width - left) / Math.max(end, 1e-9);
-        draw.fillRect(left + from * scale, row * i + 3, Math.max((to - from) * scale, 1.5), row - 6);
+        draw.fillRect(THUMB + from * scale, ROW * i + 3, Math.max((Math.min(to, end) - from) * scale, 1.5), ROW - 6);
       }
     });
-    return { left, width };
   }
-  let ruler = null;
+  $("strips").onpointerdown = $("strips").onpointermove = (event) => {
+    if (!event.buttons) return;
+    event.target.setPointerCapture(event.pointerId);
+    halt((event.offsetX - THUMB) / Math.max(event.target.clientWidth - 2 * THUMB, 1) * end);
+  };
+
+  // ----------------------------------------------------------------------------------------------- drawing
   function resize() {
+    const { clientWidth, clientHeight } = $("stage");
     renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
-    renderer.setSize(innerWidth, innerHeight, false);
-    camera.aspect = innerWidth / innerHeight;
-    camera.updateProjectionMatrix();
-    ruler = strips();
+    renderer.setSize(clientWidth, clientHeight, false);
+    view.resize(clientWidth, clientHeight);
+    strips();
+    touch();
   }
-  addEventListener("resize", resize);
-  resize();
+  new ResizeObserver(resize).observe($("stage"));
 
   function draw(now) {
-    if (playing && last !== null && end > 0) {
-      const step = Math.min((now - last) / 1000, 0.1) * Number($("speed").value);
-      set((time + step) % end);
-    }
+    const passed = last === null ? 0 : Math.min((now - last) / 1000, 0.1);
     last = now;
-    const where = pose(time);
-    if ($("follow").checked && worlds === 1) {
-      const dx = where.x - followed.x, dy = where.y - followed.y;
-      camera.position.x += dx;
-      camera.position.y += dy;
-      orbit.target.x += dx;
-      orbit.target.y += dy;
+    if (playing && end > 0 && passed) {
+      const next = time + passed * Number($("speed").value), around = next > end;
+      seek(next % end);
+      jumped = around;
     }
-    followed.copy(where);
-    sun.target.position.set(worlds > 1 ? 0 : where.x, worlds > 1 ? 0 : where.y, 0);
-    sun.position.copy(sun.target.position).add(new THREE.Vector3(4, -6, 11));
-    orbit.update();
-    renderer.render(scene, camera);
+    if (stale) {
+      stale = false;
+      who.pose(time, ghost);
+      view.go(jumped ? undefined : passed);
+      jumped = false;
+      view.keep();
+      who.root(0, spot);
+      sun.target.position.set(take.worlds > 1 ? 0 : spot.x, take.worlds > 1 ? 0 : spot.y, 0);
+      sun.position.copy(sun.target.position).add(new THREE.Vector3(4, -6, 11));
+      renderer.render(scene, view.camera);
+      if (playing) stale = true;
+    }
     requestAnimationFrame(draw);
   }
-  set(Math.min(take.start, end));
+  who.pose(0, "");
+  seek(take.start);
+  resize();
+  view.begin();
+  if (take.worlds > 1) follow(false);
+  heed();
   requestAnimationFrame(draw);
 })();

@@ -51,8 +51,10 @@ class Tracking:
     """(frames,) bool by name."""
     root: np.ndarray
     """(frames, 3) [m] where the root was."""
+    wanted: np.ndarray
+    """(frames, nbody, 7) [m, -] where the reference has all bodies."""
     wanted_root: np.ndarray
-    """(frames, 3) [m] where the reference has it."""
+    """(frames, 3) [m] of them the root."""
     limbs: tuple[Limb, ...]
     """feet and hands, the worst first"""
 
@@ -79,6 +81,7 @@ def track(model: Model, seen: Trajectory) -> Tracking:
         fallen=body_q[:, root, 2] < FALLEN * wanted[:, root, 2],
         contacts=find_contacts(model, body_q),
         root=body_q[:, root, :3],
+        wanted=wanted,
         wanted_root=wanted[:, root, :3],
         limbs=limbs(model, body_q, wanted, seen.timestep),
     )

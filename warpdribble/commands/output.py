@@ -58,6 +58,7 @@ def write_outputs(
         seen.body_q.astype(float),
         fps=1.0 / model.timestep,
         notes={"creator": f"warpdribble {__version__}", "clip": source, "root": root},
+        reference=tracking.wanted,
     )
     hands = zip(("right hand", "left hand"), model.roles.hands[::-1])
     heights = {label: seen.body_q[:, model.body(body), 2] for label, body in hands}

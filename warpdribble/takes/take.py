@@ -52,6 +52,8 @@ class Take:
     """Where the take comes from; stored as the layer's custom data."""
     model: Model | None = None
     """What the bodies are of; without it a take has no physics and no skin."""
+    reference: np.ndarray | None = None
+    """(frames, bodies, 7) [m, -] of a take of one world: what it should have done; the replay's ghost."""
 
     def __post_init__(self) -> None:
         shape, count = np.shape(self.body_q), len(self.body_names)
@@ -68,13 +70,24 @@ class Take:
             raise ValueError("body_q holds quaternions of length 0")
         if not (np.isfinite(self.fps) and self.fps > 0.0):
             raise ValueError(f"fps is {self.fps}, should be above 0")
+        if self.reference is not None and np.shape(self.reference) != np.shape(self.body_q):
+            raise ValueError(f"reference is {np.shape(self.reference)}, should be as body_q, {shape}")
         if self.model is not None and list(self.model.body_names) != list(self.body_names):
             raise ValueError("body_names are not those of the model")
 
     @classmethod
-    def of(cls, model: Model, body_q: np.ndarray, fps: float, *, notes: dict[str, str] | None = None) -> Take:
+    def of(
+        cls,
+        model: Model,
+        body_q: np.ndarray,
+        fps: float,
+        *,
+        notes: dict[str, str] | None = None,
+        reference: np.ndarray | None = None,
+    ) -> Take:
         """A take of a model, with its bodies, shapes and physics."""
-        return cls(list(model.body_names), model.shapes, body_q, fps, notes=notes or {}, model=model)
+        names, notes = list(model.body_names), notes or {}
+        return cls(names, model.shapes, body_q, fps, notes=notes, model=model, reference=reference)
 
     @property
     def worlds(self) -> np.ndarray:

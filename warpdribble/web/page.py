@@ -2,7 +2,7 @@
 
 Motion goes in as integers (a position in 65 535 steps of the take's extent, well below a millimetre on a
 court; a quaternion in 1/32 767), shapes as the meshes of the USD take; three.js (MIT, `assets/replay`) draws
-them.
+them. Of the reference, where the take has one, go 25 poses a second, without fingers.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,13 @@ from ..takes.take import Take, TakeError, check_writable
 
 MOST_WORLDS = 64
 """Worlds that are shown at most, the first ones of a take."""
+
+
+SCRIPTS = ("figures", "camera", "replay")
+GHOST_RATE = 25.0
+"""[Hz] at which the reference goes in; a browser draws what is between."""
+LIGHT = 0.1
+"""[kg] Bodies below this (fingers) are no part of the ghost, but for the ball."""
 
 
 class Blocks:
@@ -70,11 +78,10 @@ def write_replay(
         "THREE": asset("replay/three.js").read_text(encoding="utf-8"),
         "TAKE": json.dumps(said).replace("</", "<\\/"),
         "DATA": base64.b64encode(bytes(blocks.data)).decode(),
-        "REPLAY": asset("replay/replay.js").read_text(encoding="utf-8"),
+        "REPLAY": "\n".join(asset(f"replay/{name}.js").read_text(encoding="utf-8") for name in SCRIPTS),
     }
     page = asset("replay/page.html").read_text(encoding="utf-8")
-    pieces = page.split("@")
-    text = "".join(parts.get(piece, piece) for piece in pieces)
+    text = re.sub(r"@([A-Z]+)@", lambda found: parts[found[1]], page)
     try:
         with whole(path) as part:
             part.write_text(text, encoding="utf-8")
@@ -94,8 +101,8 @@ def _describe(
 ) -> dict[str, Any]:
     worlds = np.asarray(take.worlds[:MOST_WORLDS], float)
     count, frames, bodies = worlds.shape[:3]
-    places, turns = worlds[..., :3], np.stack([figure.continuous_quaternions(w[..., 3:]) for w in worlds])
-    low, packed, size = _steps(places)
+    places = worlds[..., :3]
+    turns = np.stack([figure.continuous_quaternions(w[..., 3:]) for w in worlds])
     offsets = crowd.layout(count, spacing if count > 1 else 0.0)
     player = [i for i, name in enumerate(take.body_names) if name != take.ball]
     reach = 3.5 if count == 1 else float(np.abs(offsets).max()) + 2.5
@@ -110,15 +117,35 @@ def _describe(
         "start": float(start),
         "offsets": np.round(offsets, 4).tolist(),
         "contacts": {str(k): _spans(v, take.fps) for k, v in contacts.items()},
-        "motion": {
-            "low": low,
-            "size": size,
-            "places": blocks.add(packed, "u2"),
-            "turns": blocks.add(np.round(turns * 32767), "i2"),
-        },
+        "motion": _motion(places, turns, blocks),
         "meshes": _meshes(take, skin, float(np.abs(places[..., :2]).max()) + reach, blocks),
         "skin": _skin(take.model, blocks) if skin and take.model is not None else None,
+        "ghost": _ghost(take, blocks) if take.reference is not None and count == 1 else None,
     }
+
+
+def _motion(places: np.ndarray, turns: np.ndarray, blocks: Blocks) -> dict[str, Any]:
+    """places (..., 3) [m] and unit quaternions turns (..., 4)."""
+    low, packed, size = _steps(places)
+    at = blocks.add(packed, "u2")
+    return {"low": low, "size": size, "places": at, "turns": blocks.add(np.round(turns * 32767), "i2")}
+
+
+def _ghost(take: Take, blocks: Blocks) -> dict[str, Any]:
+    """The reference of a take: its bodies and how they move. carriers: for each body of the take the place in
+    `bodies` of what it goes along with where it has no motion of its own, as a finger with its hand."""
+    reference, every = np.asarray(take.reference, float), max(1, round(take.fps / GHOST_RATE))
+    names = take.body_names
+    heavy = [take.model is None or take.model.body_mass[b] > LIGHT for b in range(len(names))]
+    bodies = [b for b, name in enumerate(names) if heavy[b] or name == take.ball]
+    rows = reference[::every, bodies]
+    carriers = []
+    for body in range(len(names)):
+        while take.model is not None and body not in bodies:
+            body = int(take.model.body_parent[body])
+        carriers.append(bodies.index(body))
+    motion = _motion(rows[..., :3], figure.continuous_quaternions(rows[..., 3:]), blocks)
+    return motion | {"bodies": bodies, "frames": len(rows), "fps": take.fps / every, "carriers": carriers}
 
 
 def _spans(on: np.ndarray, fps: float) -> list[list[float]]:

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,6 +90,46 @@ def test_worlds_are_shown_up_to_a_number(dribble_take, tmp_path):
     assert places(said, array).shape[0] == replay.MOST_WORLDS
 
 
+def test_a_reference_goes_along_as_a_ghost_and_costs_little(dribble_take, tmp_path):
+    """25 poses a second of all bodies but fingers, within a millimetre; fingers go with their hand."""
+    wanted = dribble_take.body_q.copy()
+    wanted[..., :2] += [0.3, -0.2]
+    take = replace(dribble_take, reference=wanted)
+    said, array = read_back(write_replay(tmp_path / "take.html", take))
+    ghost, model = said["ghost"], take.model
+    assert ghost["fps"] == 25.0 and ghost["frames"] == 18
+    names = [model.body_names[b] for b in ghost["bodies"]]
+    assert {"pelvis", "head", "l_foot", "r_hand", "ball"} <= set(names)
+    shape = (ghost["frames"], len(names))
+    packed = array(ghost["places"]).reshape(*shape, 3)
+    found = np.array(ghost["low"]) + packed / 65535 * np.array(ghost["size"])
+    assert np.abs(found - wanted[::2, ghost["bodies"], :3]).max() < 1e-4
+    turns = array(ghost["turns"]).reshape(*shape, 4) / 32767
+    assert np.abs(np.abs(np.sum(turns * wanted[::2, ghost["bodies"], 3:], axis=-1)) - 1.0).max() < 1e-4
+    carriers = [names[c] for c in ghost["carriers"]]
+    for body, carrier in zip(model.body_names, carriers):
+        own = body in names
+        assert carrier == body if own else model.body(body) in model.descendants(model.body(carrier))
+    light = [c for b, c in zip(model.body_names, carriers) if b not in names]
+    assert sorted(light) == ["l_hand"] * 15 + ["r_hand"] * 15
+    motion = sum(said["motion"][part]["count"] for part in ("places", "turns"))
+    assert sum(ghost[part]["count"] for part in ("places", "turns")) < 0.25 * motion
+
+
+def test_without_a_reference_or_with_many_worlds_there_is_no_ghost(dribble_take, tmp_path):
+    said, _ = read_back(write_replay(tmp_path / "take.html", dribble_take))
+    assert said["ghost"] is None
+    both = np.stack([dribble_take.body_q] * 2)
+    take = Take.of(dribble_take.model, both, 50.0, reference=both)
+    said, _ = read_back(write_replay(tmp_path / "take.html", take))
+    assert said["ghost"] is None
+
+
+def test_a_reference_has_a_pose_for_every_frame(dribble_take):
+    with pytest.raises(ValueError, match=r"reference is \(35, 51, 7\), should be as body_q, \(36, 51, 7\)"):
+        replace(dribble_take, reference=dribble_take.body_q[:-1])
+
+
 def test_only_html_is_written(dribble_take, tmp_path):
     with pytest.raises(TakeError, match=r"\.html"):
         write_replay(tmp_path / "take.txt", dribble_take)
@@ -103,23 +144,30 @@ def test_a_browser_shows_the_player_moving(dribble_take, tmp_path, with_skin):
         pytest.skip("no Chromium")
     from matplotlib.image import imread
 
+    wanted = dribble_take.body_q.copy()
+    wanted[..., 1] += 0.5
+    take = replace(dribble_take, reference=wanted)
+    page = write_replay(tmp_path / "take.html", take, {"x": np.arange(36) > 9}, skin=with_skin)
+    addresses = ("#t=0", "#t=0.35", "", "#t=0&ghost", "#t=0&ghost=here", "#t=0&view=above")
     pictures = []
-    for number, (start, playing) in enumerate(((0.0, False), (0.35, False), (0.0, True))):
-        page = write_replay(tmp_path / f"{number}.html", dribble_take, skin=with_skin, start=start)
-        if not playing:
-            page.write_text(page.read_text().replace("playing = true", "playing = false"))
+    for number, said in enumerate(addresses):
         shot = tmp_path / f"{number}.png"
         command = [
             browser, "--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
             "--enable-unsafe-swiftshader", f"--user-data-dir={tmp_path / 'profile'}", "--window-size=640,480",
-            "--virtual-time-budget=1000", "--enable-logging=stderr", f"--screenshot={shot}", page.as_uri(),
+            "--virtual-time-budget=1000", "--enable-logging=stderr", f"--screenshot={shot}",
+            page.as_uri() + said,
         ]  # fmt: skip
         done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
         assert "Uncaught" not in done.stderr, done.stderr[-2000:]
         pictures.append(imread(shot)[..., :3])
-    first, second, played = pictures
+    first, second, played, ghost, over, above = pictures
     upper = first[60:380]
     red, orange = (upper[..., 0] > 1.6 * upper[..., 1]), (upper[..., 0] > 2.2 * upper[..., 2])
     assert red.mean() > 0.005 and orange.mean() > 0.01
     assert np.mean(np.abs(first - second).max(axis=-1) > 0.15) > 0.005
     assert np.mean(np.abs(first - played).max(axis=-1) > 0.15) > 0.005
+    blue = [np.mean(p[..., 2] > 1.25 * p[..., 0]) for p in (first[60:380], ghost[60:380])]
+    assert blue[1] > blue[0] + 0.005
+    for other in (ghost, over, above):
+        assert np.mean(np.abs(first[:380] - other[:380]).max(axis=-1) > 0.1) > 0.005
