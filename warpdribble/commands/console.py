@@ -59,7 +59,7 @@ def compiling() -> Iterator[None]:
 
     from ..sims.worlds.batch import telling
 
-    waiting = "compiling kernels (about a minute, once: then they are cached) ..."
+    waiting = "compiling kernels (once; about a minute, then they are cached) ..."
     console, shown = Console(stderr=True), contextlib.ExitStack()
     told = False
 
