@@ -5,7 +5,8 @@
   $("title").textContent = take.title;
   let renderer;
   try {
-    renderer = new THREE.WebGLRenderer({ canvas: $("view"), antialias: true });
+    renderer = new THREE.WebGLRenderer({ canvas: $("view"), antialias: true,
+      preserveDrawingBuffer: true }); // a paused page is not drawn anew, and has to stay when it is printed
   } catch (error) {
     $("trouble").textContent = "This browser shows no WebGL, which the replay needs.";
     $("trouble").hidden = false;
@@ -156,6 +157,8 @@
     touch();
   }
   new ResizeObserver(resize).observe($("stage"));
+  document.addEventListener("visibilitychange", touch);
+  $("view").addEventListener("webglcontextrestored", touch);
 
   function draw(now) {
     const passed = last === null ? 0 : Math.min((now - last) / 1000, 0.1);
