@@ -53,6 +53,16 @@ def forward(model: Model, joint_q: ArrayLike, bodies: Iterable[int] | None = Non
     return body_q
 
 
+def centres_of_mass(model: Model, body_q: np.ndarray) -> tuple[list[int], np.ndarray]:
+    """The root and what hangs on it: indices of the bodies, and their centres of mass (frames, bodies, 3) [m]
+    at body_q (frames, nbody, 7)."""
+    own = model.descendants(model.joint_body(model.root))
+    turns = (Rotation.from_quat(body_q[:, b, 3:]) for b in own)
+    return own, np.stack(
+        [body_q[:, b, :3] + turn.apply(model.body_com[b]) for b, turn in zip(own, turns)], axis=1
+    )
+
+
 def twist(turn: Rotation, axis: np.ndarray) -> np.ndarray:
     """The angle (frames,) [rad] about `axis` that comes nearest to each rotation."""
     q = turn.as_quat()

@@ -80,11 +80,7 @@ def holding_torques(model: Model, reference: Reference, feet: Sequence[str]) -> 
 def pushes(model: Model, body_q: np.ndarray, timestep: float) -> tuple[np.ndarray, np.ndarray]:
     """Of the root and what hangs on it, moving as body_q (frames, nbody, 7): centres of mass (frames, bodies,
     3) [m], and the forces (frames, bodies, 3) [N] that carry and accelerate them."""
-    own = model.descendants(model.joint_body(model.root))
-    com = np.stack(
-        [body_q[:, b, :3] + Rotation.from_quat(body_q[:, b, 3:]).apply(model.body_com[b]) for b in own],
-        axis=1,
-    )
+    own, com = pose.centres_of_mass(model, body_q)
     return com, model.body_mass[own, None] * (_acceleration(com, timestep) - model.gravity)
 
 
