@@ -21,6 +21,7 @@ from ..ball.flight import GRAVITY, Bounce, T
 from ..model import Model, pose
 from ..reference.reference import Reference, resample_q
 from .breath import BREATH, Breath, Swing, swing
+from .posture import hang, shrug, turn
 
 Heights = Callable[[np.ndarray], np.ndarray]
 HAND_YAW = np.radians(18.0)
@@ -151,6 +152,11 @@ def _cycle(style: Dribble, radius: float, v: float) -> tuple[Bounce, float, Push
     return bounce, up, push, push.at(hold) - style.release_height
 
 
+def bounce_of(style: Dribble, radius: float) -> Bounce:
+    """The ball of a stroke from the hand to the hand. Raises ValueError when there is none."""
+    return Bounce(style.release_height, release_speed(style, radius), radius, style.restitution)
+
+
 def stroke(style: Dribble, radius: float) -> tuple[float, Heights, Heights]:
     """How long the ball is in flight [s], and heights of the ball and of the palm [m] as functions of the
     time since the release [s]."""
@@ -214,20 +220,12 @@ def trunk(
         (model.q_slice("lower_back"), style.lean[1], 0.5 * bent, 0.4),
         (model.q_slice("torso"), style.lean[2], 0.5 * bent, 0.4),
     ):
-        turn = _turn(share * yaw, lean + pitch, share * roll)
-        joint_q[:, place] = turn.as_quat()
-        below = below * turn
-    head = _turn(aside(breath.face), style.gaze + swing(breath.head, turns), 0.0 * turns)
+        bend = turn(share * yaw, lean + pitch, share * roll)
+        joint_q[:, place] = bend.as_quat()
+        below = below * bend
+    head = turn(aside(breath.face), style.gaze + swing(breath.head, turns), 0.0 * turns)
     joint_q[:, model.q_slice("neck")] = (below.inv() * head).as_quat()
-    for side, up in (("l", 1.0), ("r", -1.0)):
-        joint_q[:, model.q_slice(f"{side}_clavicle")] = _turn(
-            0.0 * turns, 0.0 * turns, up * swing(breath.shoulders, turns)
-        ).as_quat()
-
-
-def _turn(yaw: np.ndarray, pitch: np.ndarray, roll: np.ndarray) -> Rotation:
-    """Left, down and right side down [degrees], in turn."""
-    return Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll]), degrees=True)
+    shrug(model, joint_q, swing(breath.shoulders, turns))
 
 
 def legs(model: Model, joint_q: np.ndarray, style: Dribble) -> None:
@@ -242,17 +240,9 @@ def legs(model: Model, joint_q: np.ndarray, style: Dribble) -> None:
 
 def _left_arm(model: Model, joint_q: np.ndarray, breath: Breath, turns: np.ndarray) -> None:
     """Hangs beside the body, elbow behind it and hand in front, swinging against the push."""
-    upper, lower, _ = pose.limb_bodies(model, "l_elbow")
-    zero = model.zero_pose[:, :3]
     ahead = np.radians(FREE_ARM[0] + swing(breath.arm, turns))
     down = np.column_stack([np.sin(ahead), np.full_like(ahead, 0.24), -np.cos(ahead)])
-    inward = np.tile([0.35, -1.0, 0.0], (len(turns), 1))
-    own = pose.frame_of(zero[lower] - zero[upper], model.joint_axis("l_elbow"))
-    above = int(model.body_parent[upper])
-    parent = pose.forward(model, joint_q, [above])[:, above, 3:]
-    turn = Rotation.from_quat(parent).inv() * pose.frame_of(down, inward) * own.inv()
-    joint_q[:, model.q_slice("l_shoulder")] = turn.as_quat()
-    joint_q[:, model.q_slice("l_elbow")] = np.radians(FREE_ARM[1] + swing(breath.elbow, turns))[:, None]
+    hang(model, joint_q, "l", down, FREE_ARM[1] + swing(breath.elbow, turns))
 
 
 def _right_arm(
@@ -265,9 +255,9 @@ def _right_arm(
     hand = model.body("r_hand")
     shape = model.first_shape(hand)
     centre = np.array(shape.pos) - [0.0, 0.0, shape.size[2]]
-    turn = Rotation.from_euler("ZYX", np.column_stack([0 * tilt + HAND_YAW, tilt, 0 * tilt + roll]))
-    turn = turn * Rotation.from_euler("z", 0.5 * np.pi)  # fingers, -Y in the zero pose, to +X
-    palm = under + radius * turn.apply([0.0, 0.0, 1.0])
-    wrist = palm - turn.apply(centre)
+    lying = Rotation.from_euler("ZYX", np.column_stack([0 * tilt + HAND_YAW, tilt, 0 * tilt + roll]))
+    lying = lying * Rotation.from_euler("z", 0.5 * np.pi)  # fingers, -Y in the zero pose, to +X
+    palm = under + radius * lying.apply([0.0, 0.0, 1.0])
+    wrist = palm - lying.apply(centre)
     elbow_axis = np.array([0.35, -0.80, 0.50])
-    pose.place_limb(model, joint_q, "r_elbow", wrist, turn, elbow_axis)
+    pose.place_limb(model, joint_q, "r_elbow", wrist, lying, elbow_axis)
