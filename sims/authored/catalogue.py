@@ -13,13 +13,15 @@ from ..model import Model
 from ..reference.reference import Reference
 from .carry import carry
 from .dribble import dribble_right
+from .run_dribble import run_dribble
 from .switch import switch
 from .waist import waist
 
 
 @dataclass(frozen=True)
 class Authored:
-    """A cyclic reference, its last row the first one again, and its ball, which is in its coordinates too."""
+    """A cyclic reference, its last row the first one again, farther on where it runs, and its ball, which is
+    in its coordinates too."""
 
     reference: Reference
     ball: Ball
@@ -39,6 +41,7 @@ AUTHORED: dict[str, Callable[[Model], tuple[Reference, np.ndarray, np.ndarray]]]
     "dribble_right": _dribble,
     "waist": waist,
     "switch_hands": switch,
+    "run_dribble": run_dribble,
 }
 """Name -> its author: reference, way of the ball (rows, 3) [m], which hand has it (rows, 2) bool."""
 

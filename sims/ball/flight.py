@@ -11,6 +11,9 @@ import numpy as np
 T = TypeVar("T", float, np.ndarray)
 GRAVITY, BOUNCE = 9.81, 0.8
 """[m/s^2] and [-], of the ball in references; the simulated one has its model's."""
+GRIP = 0.6
+"""[-] Of its speed over the ground that a ball without spin keeps as the ground grips it. What the ground
+takes spins it, m (v - v') r = 2/3 m r^2 w, until it rolls, v' = w r: a hollow ball keeps three fifths."""
 SLOWEST, FASTEST = -2.0, 15.0
 """[m/s] downward, at which a ball leaves a hand."""
 
@@ -48,6 +51,16 @@ class Bounce:
         """Height [m] `since` seconds after it was let go, up to its second time on the ground."""
         rising = self.rising(np.maximum(since - self.down, 0.0))
         return np.where(since < self.down, self.falling(since), rising)
+
+    def rise_to(self, height: float) -> float:
+        """[s] from the ground up to a height [m] on its way up; nan where it comes less high."""
+        back = self.restitution * self.impact
+        return float((back - np.sqrt(back**2 - 2.0 * GRAVITY * (height - self.radius))) / GRAVITY)
+
+    def along(self, since: T) -> T:
+        """How far over the ground [s], in times of its first speed there, it is after `since` [s]: the ground
+        grips it."""
+        return np.minimum(since, self.down) + GRIP * np.maximum(since - self.down, 0.0)
 
 
 def speed_to_meet(

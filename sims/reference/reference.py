@@ -66,6 +66,13 @@ class Cycle:
         ahead, left = rotation(-begin) @ np.asarray(self.travel)
         return float(ahead), float(left)
 
+    @classmethod
+    def of(cls, model: Model, reference: Reference) -> Cycle:
+        """The cycle of a reference that is one: its last row is the first, moved straight over the ground or
+        not at all."""
+        place = reference.joint_q[:, model.q_slice(model.root)][:, :2]
+        return cls(reference, travel=tuple((place[-1] - place[0]).tolist()))
+
     def repeat(self, model: Model, count: int) -> Reference:
         """`count` cycles in a row, `count` x (frames - 1) + 1 rows. Raises ValueError when count
         < 1."""

@@ -84,7 +84,7 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
         ball = mirrored_ball(ball) if ball is not None else None
     cycle = None
     if skill.cyclic:
-        cycle = Cycle(reference) if skill.authored else _closed(model, reference)
+        cycle = Cycle.of(model, reference) if skill.authored else _closed(model, reference)
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
         reference = cycle.reference

@@ -4,7 +4,7 @@ import pytest
 from warpdribble.sims import Model
 from warpdribble.sims.authored.catalogue import AUTHORED, authored_clip
 from warpdribble.sims.model import gaps, pose
-from warpdribble.sims.reference.reference import difference
+from warpdribble.sims.reference.reference import Cycle, difference
 from warpdribble.sims.retarget.accuracy import beyond_limits
 
 R = 0.1193
@@ -33,11 +33,15 @@ def body_q(player, clip):
 
 def test_it_closes_and_is_the_same_every_time(player, name, clip):
     joint_q = clip.reference.joint_q
-    assert np.allclose(joint_q[0], joint_q[-1])
+    ahead = Cycle.of(player, clip.reference).repeat(player, 1).joint_q[-1]
+    assert np.allclose(ahead, joint_q[-1]) and np.allclose(joint_q[0, 2:7], joint_q[-1, 2:7])
+    assert np.allclose(joint_q[-1, :2] - joint_q[0, :2], [1.75, 0.0] if name == "run_dribble" else 0.0)
     assert np.array_equal(authored_clip(player, name).reference.joint_q, joint_q)
 
 
-def test_feet_are_planted_flat(player, body_q):
+def test_feet_are_planted_flat(player, name, body_q):
+    if name == "run_dribble":
+        pytest.skip("its feet move: test_gait")
     for side in "lr":
         foot = player.body(f"{side}_foot")
         assert np.ptp(body_q[:, foot, :3], axis=0).max() < 1e-9
@@ -75,7 +79,7 @@ def test_hands_stay_outside_the_body(player, body_q):
 
 def test_a_free_ball_falls_and_bounces(player, name, clip):
     free = ~clip.ball.touch.any(axis=1)
-    assert free.any() == (name in ("dribble_right", "switch_hands"))
+    assert free.any() == (name not in ("carry", "waist"))
     height = clip.ball.path[:, 2]
     fall = np.diff(height, 2) / player.timestep**2
     inside = free[:-2] & free[1:-1] & free[2:] & (height[1:-1] > 0.2)
