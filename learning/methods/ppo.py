@@ -93,7 +93,7 @@ class PpoConfig:
     """cycles at the beginning of the trajectory that do not count"""
     first_ridge: float = 0.01
     """of the regression, per unit of state variance"""
-    cost: BallWeights = field(default=BallWeights())
+    cost: BallWeights = field(default=BallWeights(change=0.6))
 
 
 BASES = ("linear", "offsets", "nothing")
