@@ -49,7 +49,7 @@ def apart(model: Model, a: ControlGraph, b: ControlGraph) -> np.ndarray:
     far = np.sqrt(there[..., own].mean(axis=-1)) + np.sqrt(there[..., feet].max(axis=-1))
     if a.touch is not None and b.touch is not None:
         far += np.sqrt(there[..., model.body(model.roles.one("ball"))])
-        held, has = (graph.touch.reshape(graph.count, STEPS, 2)[:, 0] for graph in (a, b))
+        held, has = (touch.reshape(-1, STEPS, 2)[:, 0] for touch in (a.touch, b.touch))
         far[(held[:, None] != has[None]).any(axis=-1)] = np.inf
     return far
 
@@ -167,6 +167,7 @@ def bridge(
     touch = np.zeros((rows, 2), bool)
     marks, heights = [], []
     for graph, first, start, end in parts:
+        assert graph.touch is not None and graph.checkpoints is not None and graph.heights is not None
         row = np.arange(start, end)
         there = (first + row) % (graph.count * STEPS)
         touch[row] = graph.touch[there]
