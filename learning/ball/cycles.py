@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..runs.stage import Arrays, Report
 from ..starts import Starts
-from ..tasks.arms import Arms
+from ..tasks.arms import Arms, OutOfTime
 from .hold import in_hand
 from .optimised import Optimised
 from .windows import Moment, holding, windows_of
@@ -28,7 +28,7 @@ class Window(Report):
     """A window in numbers."""
 
     found: int
-    """1; 0: the player loses the ball whatever was tried, and that was the last window"""
+    """1; 0: the player loses the ball whatever was tried, or the time is up, and that was the last window"""
     cycles: int
     """found so far"""
     fingers: float
@@ -78,7 +78,14 @@ class Cycles:
         self.found: list[Optimised] = []
         self.mean, self.times = np.zeros((graph.count, task.actions)), np.zeros(graph.count, int)
         self.ahead = np.zeros((len(self.windows[0]), task.actions))
-        self.iteration, self.stuck = 0, False
+        self.iteration, self.stuck, self.late = 0, False, False
+
+    def until(self, late: Callable[[], bool]) -> None:
+        """Search only until `late` says true, which is asked all the time: a window that is not found by then
+        is given up (`late`)."""
+        self.late = False
+        for task in self.tasks:
+            task.late = late
 
     def in_hand(self, k: int) -> Moment:
         """The ball in the hand, when fragment k begins."""
@@ -90,7 +97,7 @@ class Cycles:
 
     @property
     def done(self) -> bool:
-        return self.stuck or self.iteration >= min(self.wanted, self.tries)
+        return self.stuck or self.late or self.iteration >= min(self.wanted, self.tries)
 
     def window(self, later: int = 0) -> np.ndarray:
         """The fragments of the window that comes next, or of a later one."""
@@ -107,9 +114,12 @@ class Cycles:
     def iterate(self) -> Window:
         """One window further."""
         began, before, rounds = time.perf_counter(), self._spent, self.rounds
-        chosen = self.optimise()
+        try:
+            chosen = self.optimise()
+            self.stuck = chosen is None
+        except OutOfTime:
+            chosen, self.late = None, True
         if chosen is None:
-            self.stuck = True
             fingers = offsets = np.nan
         else:
             k, action = chosen.found.k, chosen.found.action
@@ -128,7 +138,7 @@ class Cycles:
         return Window(
             self.iteration,
             fresh=bool(self.found) and (self.done or self.iteration % FRESH == 0),
-            found=int(not self.stuck),
+            found=int(chosen is not None),
             cycles=self.iteration // len(self.windows),
             fingers=fingers,
             offsets=offsets,

@@ -127,7 +127,6 @@ class Newton(Cycles):
         pairs = list(zip(self.windows, [*self.windows[1:], self.windows[0]]))
         for k, after in pairs[:-1] if graph.ends else pairs:
             self.goal[k[-1]] = self.in_hand(int(after[0])).felt
-        self.room = config.room
         self.last = np.zeros_like(self.mean)
         """(fragments, 20) what was found last"""
         self.slopes: dict[int, np.ndarray] = {}
@@ -136,7 +135,7 @@ class Newton(Cycles):
         """of each window: the least cost so far"""
 
     def optimise(self) -> Chosen | None:
-        k = self.window()
+        k, self.room = self.window(), self.config.room
         number, first = self.iteration % len(self.windows), self.iteration < len(self.windows)
         starts = np.stack([self.ahead, self.mean[k], self.known(k), 0.5 * (self.ahead + self.mean[k])])
         at = self._best(self.tasks[0], k, starts[:, self.active[k]])

@@ -11,6 +11,7 @@ through itself: a few cycles do.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..policies.linear import Explore, LinearPolicy
 from ..rollout import Rollout
 from ..runs.stage import Arrays, Report
 from ..starts import Starts, Streams
-from ..tasks.arms import Arms
+from ..tasks.arms import Arms, OutOfTime
 from .optimised import Optimised
 
 PATIENCE = 3
@@ -118,12 +119,18 @@ class Smc:
         self.moments = Moments.of(
             np.zeros((0, n)), np.zeros((0, m)), none.astype(int), none, task.graph.count
         )
-        self.iteration, self.learned, self.lost = 0, 0, 0
+        self.iteration, self.learned, self.lost, self.late = 0, 0, 0, False
         self._begin()
+
+    def until(self, late: Callable[[], bool]) -> None:
+        """Walk only until `late` says true, which is asked all the time: a cycle that is not found by then is
+        given up (`late`)."""
+        self.late = False
+        self.task.late = late
 
     @property
     def done(self) -> bool:
-        return self.found_cycles >= self.cycles or self.iteration >= self.tries
+        return self.late or self.found_cycles >= self.cycles or self.iteration >= self.tries
 
     @property
     def found_cycles(self) -> int:
@@ -146,7 +153,10 @@ class Smc:
         if self.lost > PATIENCE:
             self.lost = 0
             self._begin()
-            return
+        else:
+            self._recall()
+
+    def _recall(self) -> None:
         self.task.recall(self.kept)
         self.rollout.k = np.array(self.kept["k"])
 
@@ -157,16 +167,13 @@ class Smc:
         task.near = np.inf if self.found_cycles >= c.settled else c.near
         streams = Streams([np.random.default_rng((self.seed, self.iteration))], group=c.particles)
         self.rollout.controller = Explore(self.policy, streams)
-        rows, costs = self._walk()
-        self.iteration += 1
-        if len(rows) < task.graph.cycle:
-            self._learn(rows)
-            self._back()
-        else:
-            self.lost = 0
-            self.rows = Rows(*(a + b for a, b in zip(vars(self.rows).values(), vars(rows).values())))
-            self._decide(max(0, len(self.rows) - c.lag))
-            self._keep()
+        costs: list[float] = []
+        try:
+            rows, costs = self._walk()
+            self._further(rows)
+        except OutOfTime:
+            self.late = True
+            self._recall()
         seconds = time.perf_counter() - began
         whole = self.found_cycles
         fingers, offsets = np.nan, np.nan
@@ -185,6 +192,18 @@ class Smc:
             samples_per_second=(task.samples - samples) / seconds,
             outside=1.0 - (task.simulating - simulating) / seconds,
         )
+
+    def _further(self, rows: Rows) -> None:
+        """After a try of a cycle."""
+        self.iteration += 1
+        if len(rows) < self.task.graph.cycle:
+            self._learn(rows)
+            self._back()
+            return
+        self.lost = 0
+        self.rows = Rows(*(a + b for a, b in zip(vars(self.rows).values(), vars(rows).values())))
+        self._decide(max(0, len(self.rows) - self.config.lag))
+        self._keep()
 
     def _walk(self) -> tuple[Rows, list[float]]:
         """A cycle's fragments, or those until all particles are lost, and the mean cost of each."""
@@ -282,8 +301,7 @@ class Smc:
         for name in COUNTS:
             setattr(self, name, int(state[name]))
         self.kept = {name[5:]: v for name, v in state.items() if name.startswith("kept.")}
-        self.task.recall(self.kept)
-        self.rollout.k = np.array(self.kept["k"])
+        self._recall()
 
 
 COUNTS = ("iteration", "learned", "lost")

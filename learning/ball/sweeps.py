@@ -49,7 +49,6 @@ def swept(
     n, P = len(k), task.worlds
     mean, sigma = start.copy(), c.sigma
     best, least, left = None, np.inf, c.sweeps
-    usual, task.near = task.near, c.near
     for _ in range(c.sweeps):
         if left == 0:
             break
@@ -67,7 +66,6 @@ def swept(
             left = min(left, c.more)
             if total.min() < least:
                 least, best = float(total.min()), _line(action, parents, int(np.argmin(total)))
-    task.near = usual
     return best
 
 
@@ -78,14 +76,18 @@ def _sweep(task: Arms, begin: Moment, action: np.ndarray, c: SweepConfig) -> tup
     rollout = Rollout(task, Given(action), Ahead(), begin.starts(P))
     begin.put(task)
     parents, total = [], np.zeros(P)
-    for fragment in rollout.fragments(len(action)):
-        parent, lost = select(fragment.cost[None], c.keep)
-        if lost[0]:
-            break
-        parents.append(parent[0])
-        total = (total + fragment.cost)[parent[0]]
-        rollout.become(parent[0])
-    task.calm()
+    usual, task.near = task.near, c.near
+    try:
+        for fragment in rollout.fragments(len(action)):
+            parent, lost = select(fragment.cost[None], c.keep)
+            if lost[0]:
+                break
+            parents.append(parent[0])
+            total = (total + fragment.cost)[parent[0]]
+            rollout.become(parent[0])
+    finally:
+        task.near = usual
+        task.calm()
     return np.array(parents, int).reshape(-1, P), total
 
 

@@ -29,6 +29,23 @@ class Usual:
         self.now: Newton | Smc = newton
         self.fingers: list[float] = []
 
+    def until(self, late: Callable[[], bool]) -> None:
+        """As of the two."""
+        then = self.then
+
+        def walk() -> Smc:
+            made = then()
+            made.until(late)
+            return made
+
+        self.now.until(late)
+        self.then = walk
+
+    @property
+    def late(self) -> bool:
+        """The time was up."""
+        return self.now.late
+
     @property
     def done(self) -> bool:
         return self.now.done
@@ -38,6 +55,8 @@ class Usual:
         if isinstance(self.now, Smc):
             return self._walked(self.now)
         now, report = self.now, self.now.iterate()
+        if now.late:
+            return report
         self.fingers.append(report.fingers)
         first = len(self.fingers) == len(now.windows)
         lost = now.stuck and len(self.fingers) <= SOME * len(now.windows)

@@ -7,7 +7,7 @@ each: shoulder 3, elbow, wrist 3, and three signals that close the fingers (Eq. 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,6 +62,10 @@ class BallWeights:
 
 
 USUAL = BallWeights()
+
+
+class OutOfTime(Exception):
+    """The time of a search is up."""
 
 
 class Arms(Locomotion):
@@ -153,6 +157,8 @@ class Arms(Locomotion):
         self._tips = len(tips)
         self._moves = np.zeros((worlds, self.actions))
         self._before = np.zeros((worlds, self.actions))
+        self.late: Callable[[], bool] = _never
+        """Asked before each fragment; once it is true, `advance` raises OutOfTime."""
         self.near = np.inf
         """[m] Distances of the fingers beyond this count less and less."""
         self.fingers = np.zeros(worlds)
@@ -203,6 +209,8 @@ class Arms(Locomotion):
 
     def advance(self, k: np.ndarray, action: np.ndarray, first: int = 0, count: int = STEPS) -> None:
         if first == 0:
+            if self.late():
+                raise OutOfTime
             legs = self.legs.act(super().observe(k), k)
             self._moves = np.where(self.active[k], action, 0.0)
             self._all = np.concatenate([legs, self._moves @ self._spread], axis=1)
@@ -264,6 +272,10 @@ ARMS = 14
 """Columns of both arms: shoulders, elbows, wrists; the fingers' follow."""
 RESTITUTION = 0.8
 """of the ball on the ground"""
+
+
+def _never() -> bool:
+    return False
 
 
 def misplaced(model: Model, starts: Starts, off: float, random: np.random.Generator) -> None:

@@ -17,6 +17,7 @@ class Steps:
 
     def __init__(self, fingers):
         self.fingers, self.iteration, self.stuck, self.found = fingers, 0, False, []
+        self.late = False
 
     @property
     def done(self):
