@@ -21,9 +21,10 @@ from ..tasks.arms import Arms, active_hands
 from ..tasks.fingers import FINGERS
 from . import paper
 from .cycles import Chosen, Cycles
+from .hold import put_out
 from .paper import PaperConfig
 from .sweeps import SweepConfig, swept
-from .windows import Tried, actions_of, attempt, windows_of
+from .windows import Tried, actions_of, attempt, holding, windows_of
 
 LANES = 8
 """Batches are made of whole vectors of worlds."""
@@ -75,6 +76,9 @@ class NewtonConfig:
     """of a descent, at most"""
     part: int = 4
     """fragments at a time, where a whole window is too much at once"""
+    beyond: int = 6
+    """fragments behind a clip's window that are found along with it, and then anew: a way that keeps the ball
+    so far may lead nowhere"""
     sweeps: SweepConfig = field(default=SweepConfig())
     """where no step leads to a window that keeps the ball"""
     search: PaperConfig = field(default=PaperConfig())
@@ -122,11 +126,17 @@ class Newton(Cycles):
         self.config, self.searches = config, searches
         self.goal = few.goal.copy()
         """(fragments, p) what the task feels where the reference ends each, with the ball in hand where a
-        window does"""
+        window does; in a clip, whose holds are long and whose ball may be inferred, out of the body, too"""
         graph = few.graph
-        pairs = list(zip(self.windows, [*self.windows[1:], self.windows[0]]))
-        for k, after in pairs[:-1] if graph.ends else pairs:
-            self.goal[k[-1]] = self.in_hand(int(after[0])).felt
+        if graph.ends:
+            held = np.array([holding(graph, k).any() for k in range(1, graph.count)] + [False])
+            held &= np.isin(np.arange(graph.count), np.concatenate(self.windows))
+            hands = graph.touch.reshape(graph.count, STEPS, 2)[held, -1]
+            self.goal[held] = few.feels(put_out(few.model, graph.goal_q[held], hands), graph.goal_qd[held])
+        for k in self.windows:
+            after = int(graph.follow(k[-1:])[0])
+            if after != k[-1] and (holding(graph, after).any() or not graph.ends):
+                self.goal[k[-1]] = self.in_hand(after).felt
         self.last = np.zeros_like(self.mean)
         """(fragments, 20) what was found last"""
         self.slopes: dict[int, np.ndarray] = {}
@@ -135,9 +145,35 @@ class Newton(Cycles):
         """of each window: the least cost so far"""
 
     def optimise(self) -> Chosen | None:
-        k, self.room = self.window(), self.config.room
+        number = self.iteration % len(self.windows)
+        for k in with_beyond(self.tasks[0].graph, self.window(), self.config):
+            at, slope = self._found(k)
+            if at.keeps:
+                break
+        chosen = None
+        if at.keeps:
+            chosen = self._chosen(at)
+        elif self.searches:
+            chosen = paper.optimised(self, self.tasks[1], self.config.search)
+        if chosen is not None:
+            least, self.last = self.least.copy(), self.last.copy()
+            if at.keeps:
+                least[number] = min(least[number], at.cost)
+                if not self.tasks[0].graph.ends:  # a clip's windows do not come again
+                    slope = self._slope(k, at) if slope is None else slope
+                    self.slopes = self.slopes | {number: slope}
+                self.last[k] = at.tried.action[:, at.world]
+            self.least, self.last[chosen.found.k] = least, chosen.found.action
+            chosen = replace(chosen, ahead=self.last[self.window(1)])
+        return chosen
+
+    def _found(self, k: np.ndarray) -> tuple[Point, np.ndarray | None]:
+        """The best way through fragments k, which begin with the next window, and the slope there, where it
+        is known."""
+        self.room = self.config.room
         number, first = self.iteration % len(self.windows), self.iteration < len(self.windows)
-        starts = np.stack([self.ahead, self.mean[k], self.known(k), 0.5 * (self.ahead + self.mean[k])])
+        ahead, mean = self.last[k], self.mean[k]
+        starts = np.stack([ahead, mean, self.known(k), 0.5 * (ahead + mean)])
         at = self._best(self.tasks[0], k, starts[:, self.active[k]])
         enough = self.config.good if first else max(self.config.good, self.config.enough * self.least[number])
         at, slope = self._descend(k, at, self.slopes.get(number), enough)
@@ -152,25 +188,14 @@ class Newton(Cycles):
         if not at.keeps and (action := self._swept(k)) is not None:
             at = self._best(self.tasks[0], k, action[self.active[k]][None])
             at, slope = self._descend(k, at, None, enough)
-        chosen = None
-        if at.keeps:
-            chosen = self._chosen(at)
-        elif self.searches:
-            chosen = paper.optimised(self, self.tasks[1], self.config.search)
-        if chosen is not None:
-            least, self.last = self.least.copy(), self.last.copy()
-            if at.keeps:
-                least[number] = min(least[number], at.cost)
-                self.slopes = self.slopes | {number: slope}
-            self.least, self.last[k] = least, chosen.found.action
-            chosen = replace(chosen, ahead=self.last[self.window(1)])
-        return chosen
+        return at, slope
 
     def _descend(
         self, k: np.ndarray, at: Point, slope: np.ndarray | None, enough: float
-    ) -> tuple[Point, np.ndarray]:
+    ) -> tuple[Point, np.ndarray | None]:
         """From a candidate for fragments k down to where the ball is kept and the cost `enough`, or no step
-        helps any more; and the slope there, or thereabouts. slope: one to try before a new one is taken."""
+        helps any more; and the slope there, or thereabouts, where it is known. slope: one to try before a new
+        one is taken."""
         c, fresh = self.config, False
         for _ in range(c.steps):
             if slope is None:
@@ -185,9 +210,9 @@ class Newton(Cycles):
                 break
             else:
                 slope = None
-        return at, self._slope(k, at) if slope is None else slope
+        return at, slope
 
-    def _by_parts(self, k: np.ndarray, action: np.ndarray) -> tuple[Point, np.ndarray]:
+    def _by_parts(self, k: np.ndarray, action: np.ndarray) -> tuple[Point, np.ndarray | None]:
         """The same for the first fragments of a window, then for more and more of them: what happens late
         says little while the ball is lost early."""
         x = np.zeros(0)
@@ -209,14 +234,15 @@ class Newton(Cycles):
     def _chosen(self, at: Point) -> Chosen:
         count = len(self.window())
         after = at.tried.moment(at.world, count, int(self.window(1)[0]))
-        return Chosen(at.tried.found(at.world, count), after, at.tried.action[:, at.world])
+        return Chosen(at.tried.found(at.world, count), after, at.tried.action[:count, at.world])
 
     def _try(self, task: Arms, k: np.ndarray, candidates: np.ndarray) -> tuple[Tried, np.ndarray]:
         """Candidates (m, n) for fragments k, and the errors (worlds, e) of each; the last of them again in
         what worlds are left."""
         rows = np.minimum(np.arange(task.worlds), len(candidates) - 1)
         self.rounds += 1
-        tried = attempt(task, self.begin, k, actions_of(candidates[rows], self.active[k]), len(k))
+        count = min(len(k), len(self.window()))
+        tried = attempt(task, self.begin, k, actions_of(candidates[rows], self.active[k]), count)
         return tried, self._errors(tried, candidates[rows])
 
     def _best(self, task: Arms, k: np.ndarray, candidates: np.ndarray) -> Point:
@@ -230,18 +256,19 @@ class Newton(Cycles):
     def _errors(self, tried: Tried, x: np.ndarray) -> np.ndarray:
         """(worlds, e) what is wrong with candidates x (worlds, n), in deviations that count as one."""
         c, task, k = self.config, self.tasks[0], tried.k
+        assert task.graph.touch is not None
         columns, n = task.columns, len(k)
         reached = np.minimum(np.arange(n), len(tried.felt) - 1)
         felt = tried.felt[reached]
         off = felt - self.goal[k][:, None]
-        weight = np.where(np.arange(n) == n - 1, c.last, 1.0)[:, None, None] / np.sqrt(n)
+        last = c.last if task.graph.touch[(k[-1] + 1) * STEPS - 1].any() or not task.graph.ends else 1.0
+        weight = np.where(np.arange(n) == n - 1, last, 1.0)[:, None, None] / np.sqrt(n)
         parts = [
             weight * off[..., columns["ball"]] / c.ball,
             weight * off[..., columns["ball velocity"]] / c.speed,
         ]
         hands = [off[-1:, :, columns[f"hand {hand}"]] for hand in task.model.roles.both("hands")]
         parts += [weight[-1] * hand / c.hand for hand in hands]
-        assert task.graph.touch is not None
         touch = task.graph.touch[(k + 1) * STEPS - 1]
         share = 1.0 / np.sqrt(len(FINGERS) * max(touch.sum(), 1))
         for hand, side in enumerate("lr"):
@@ -290,10 +317,18 @@ def corrected(slope: np.ndarray, step: np.ndarray, change: np.ndarray) -> np.nda
     return np.asarray(slope + np.outer(change - slope @ step, step) / (step @ step))
 
 
+def with_beyond(graph: ControlGraph, window: np.ndarray, c: NewtonConfig) -> list[np.ndarray]:
+    """What is found at a time: a window and what comes behind it in a clip, or where that does not go, it
+    alone."""
+    end = int(window[-1]) + 1
+    more = np.arange(end, min(end + c.beyond, graph.count)) if graph.ends else window[:0]
+    return [np.concatenate([window, more]), window] if len(more) else [window]
+
+
 def sizes(model: Model, graph: ControlGraph, c: NewtonConfig) -> tuple[int, int, int]:
     """Worlds for starts, steps and differences."""
     active = active_hands(model, graph)
-    numbers = max(int(active[k].sum()) for k in windows_of(graph))
+    numbers = max(int(active[with_beyond(graph, k, c)[0]].sum()) for k in windows_of(graph))
     starts, steps, slopes = (
         -(-size // LANES) * LANES for size in (STARTS, len(c.damping) * len(c.lengths), numbers + 1)
     )

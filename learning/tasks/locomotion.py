@@ -118,8 +118,8 @@ class Locomotion(Follow):
         self.loose = [(j.q.start, j.dof.start) for j in model.joints[1:] if j.kind == "free"]
         self.heading = np.zeros(worlds)
         """(worlds,) [rad] that each world should face"""
-        self.start = self._reference(graph.start_q, graph.start_qd)
-        self.goal = self._reference(graph.goal_q, graph.goal_qd)
+        self.start = self.feels(graph.start_q, graph.start_qd)
+        self.goal = self.feels(graph.goal_q, graph.goal_qd)
         self.goal[:, self.columns["miss"]] = 0.0
         self.probe.want(self.goal)
         self.felt = np.zeros((worlds, self.probe.size), np.float32)
@@ -128,8 +128,8 @@ class Locomotion(Follow):
         """(worlds,) who failed in the last fragment by falling"""
         self._cost = np.zeros(worlds, np.float32)
 
-    def _reference(self, joint_q: np.ndarray, joint_qd: np.ndarray) -> np.ndarray:
-        """What is felt in given states."""
+    def feels(self, joint_q: np.ndarray, joint_qd: np.ndarray) -> np.ndarray:
+        """(n, p) what the probe says in given states, into which the worlds are put for it."""
         felt = []
         for first in range(0, len(joint_q), self.worlds):
             rows = np.minimum(np.arange(first, first + self.worlds), len(joint_q) - 1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpdribble.learning.ball.hold import CLEAR, closed, in_hand
+from warpdribble.learning.ball.hold import CLEAR, closed, in_hand, put_out
 from warpdribble.learning.tasks.fingers import FINGERS, READY, finger_signals
 from warpdribble.sims.model import pose
 from warpdribble.sims.worlds import Simulation
@@ -45,6 +45,42 @@ def test_palm_and_fingers_touch_the_ball(full, dribbled):
 def test_nobody_holds_it(full, dribbled):
     with pytest.raises(ValueError, match="no hand"):
         in_hand(full, dribbled.start_q[3], np.zeros(2, bool))
+
+
+def room(model, q):
+    """[m] from the ball to the nearest of what is not a hand, and of all."""
+    sim = Simulation(model, 1)
+    sim.reset(joint_q=q)
+    contacts = sim.contacts()
+    ball = np.array(["ball" in shapes for shapes in contacts.shapes])
+    bad = model.tables["slot_flag"] == 2
+    return contacts.gap[0, ball & bad].min(), contacts.gap[0, ball].min()
+
+
+def test_a_ball_in_the_thigh_comes_out_the_short_way(full, dribbled):
+    """By its depth, where no hand has it; where one does it stays with the palm; the rest is as before."""
+    ball = full.q_slice(full.roles.one("ball_joint")).start
+    leg = pose.forward(full, dribbled.start_q[11])[0, full.body("r_upper_leg")]
+    inside = dribbled.start_q[11].copy()
+    along = Rotation.from_quat(leg[3:]).apply([0.0, 0.0, -0.2])
+    inside[ball : ball + 3] = leg[:3] + along + [0.14, -0.06, 0.0]
+    before = room(full, inside)[0]
+    assert before < -0.02
+    held = in_hand(full, dribbled.start_q[11], np.array([False, True]))
+    into = held.copy()
+    into[ball : ball + 3] += [0.0, 0.0, 0.03]  # into the palm
+    assert room(full, into)[1] < -0.01
+    hands = np.array([[False, False], [False, True], [False, False]])
+    out, back, same = put_out(full, np.stack([inside, into, held]), hands)
+    assert room(full, out)[0] > CLEAR - OVERLAP
+    by = np.linalg.norm(out[ball : ball + 3] - inside[ball : ball + 3])
+    assert CLEAR - before - OVERLAP < by < 1.3 * (CLEAR - before)
+    assert room(full, back)[1] > -OVERLAP and abs(gaps(full, back, "r")[-1]) < NEAR
+    np.testing.assert_allclose(same, held, atol=2e-4)
+    for q, was in ((out, inside), (back, into)):
+        np.testing.assert_array_equal(
+            np.delete(q, range(ball, ball + 3)), np.delete(was, range(ball, ball + 3))
+        )
 
 
 def test_closed_from_ready_to_flat_and_to_fist(full):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from warpdribble.learning.ball.newton import NewtonConfig, with_beyond
 from warpdribble.learning.ball.windows import LONGEST, Moment, actions_of, attempt, holding, windows_of
 from warpdribble.learning.graph import STEPS, ControlGraph
 from warpdribble.learning.starts import Starts
@@ -172,3 +173,16 @@ def test_long_windows_are_cut_while_a_hand_has_the_ball():
     assert max(len(part) for part in parts[1:]) <= LONGEST
     free = clip(40, touch=[(0, 8)], marks=[4])
     assert [len(part) for part in windows_of(free)] == [1, 39], "nobody has it: nowhere to cut"
+
+
+def test_what_comes_behind_is_found_along_in_a_clip_only():
+    c, graph = NewtonConfig(beyond=6), clip(12, touch=[(12, 24), (45, 50)], marks=[20, 47])
+    ways = [[k.tolist() for k in with_beyond(graph, window, c)] for window in windows_of(graph)]
+    assert ways == [
+        [[3, 4, 5, 6, 7, 8, 9, 10], [3, 4]],
+        [[5, 6, 7, 8, 9, 10, 11], [5, 6, 7, 8, 9]],
+        [[10, 11]],
+    ]
+    (window,) = windows_of(cycle(6, [13]))
+    (way,) = with_beyond(cycle(6, [13]), window, c)
+    assert way is window
