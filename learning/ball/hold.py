@@ -30,8 +30,9 @@ BAD = 2
 NEAR = 0.3
 """[-] how much less it counts how far a ball is put out of the body than that it is off the palm."""
 ROUNDS = 20
+"""of steps that put balls out of the body"""
 DAMPING = 0.03
-"""of its steps, at first"""
+"""of these steps, at first"""
 
 
 def in_hand(model: Model, joint_q: np.ndarray, hands: np.ndarray) -> np.ndarray:

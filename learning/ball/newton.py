@@ -70,15 +70,17 @@ class NewtonConfig:
     """A window is done at this multiple of the least cost that it ever had."""
     good: float = 0.05
     """or at this cost"""
+    loose: float = 1.0
+    """A clip's window is done at this cost, as its ball may be inferred."""
     fair: float = 0.3
     """A first window that costs more is begun in other ways, too."""
     steps: int = 40
     """of a descent, at most"""
     part: int = 4
     """fragments at a time, where a whole window is too much at once"""
-    beyond: int = 6
-    """fragments behind a clip's window that are found along with it, and then anew: a way that keeps the ball
-    so far may lead nowhere"""
+    beyond: int = 4
+    """fragments behind a clip's window that are found along with it, and then anew, and as many more as it
+    takes until a hand has the ball: a way that keeps the ball so far may lead nowhere"""
     sweeps: SweepConfig = field(default=SweepConfig())
     """where no step leads to a window that keeps the ball"""
     search: PaperConfig = field(default=PaperConfig())
@@ -128,11 +130,15 @@ class Newton(Cycles):
         """(fragments, p) what the task feels where the reference ends each, with the ball in hand where a
         window does; in a clip, whose holds are long and whose ball may be inferred, out of the body, too"""
         graph = few.graph
+        assert graph.touch is not None
         if graph.ends:
             held = np.array([holding(graph, k).any() for k in range(1, graph.count)] + [False])
             held &= np.isin(np.arange(graph.count), np.concatenate(self.windows))
             hands = graph.touch.reshape(graph.count, STEPS, 2)[held, -1]
             self.goal[held] = few.feels(put_out(few.model, graph.goal_q[held], hands), graph.goal_qd[held])
+            ball = few.columns["ball"]
+            for task in self.tasks:
+                task.goal[held, ball] = self.goal[held, ball]
         for k in self.windows:
             after = int(graph.follow(k[-1:])[0])
             if after != k[-1] and (holding(graph, after).any() or not graph.ends):
@@ -172,6 +178,11 @@ class Newton(Cycles):
         is known."""
         self.room = self.config.room
         number, first = self.iteration % len(self.windows), self.iteration < len(self.windows)
+        if self.tasks[0].graph.ends and (action := self._swept(k)) is not None:
+            at = self._best(self.tasks[0], k, action[self.active[k]][None])
+            at, slope = self._descend(k, at, None, self.config.loose)
+            if at.keeps:
+                return at, slope
         ahead, mean = self.last[k], self.mean[k]
         starts = np.stack([ahead, mean, self.known(k), 0.5 * (ahead + mean)])
         at = self._best(self.tasks[0], k, starts[:, self.active[k]])
@@ -229,7 +240,9 @@ class Newton(Cycles):
     def _swept(self, k: np.ndarray) -> np.ndarray | None:
         """A way that sweeps of particles find."""
         random = np.random.default_rng((self.seed, self.iteration, 1))
-        return swept(self.tasks[2], self.begin, k, np.zeros_like(self.known(k)), self.config.sweeps, random)
+        task = self.tasks[2]
+        start = self.last[k] if task.graph.ends else np.zeros_like(self.known(k))
+        return swept(task, self.begin, k, start, self.config.sweeps, random)
 
     def _chosen(self, at: Point) -> Chosen:
         count = len(self.window())
@@ -321,7 +334,10 @@ def with_beyond(graph: ControlGraph, window: np.ndarray, c: NewtonConfig) -> lis
     """What is found at a time: a window and what comes behind it in a clip, or where that does not go, it
     alone."""
     end = int(window[-1]) + 1
-    more = np.arange(end, min(end + c.beyond, graph.count)) if graph.ends else window[:0]
+    last = end + c.beyond
+    while graph.ends and last < graph.count and not holding(graph, last).any():
+        last += 1
+    more = np.arange(end, min(last, graph.count)) if graph.ends else window[:0]
     return [np.concatenate([window, more]), window] if len(more) else [window]
 
 

@@ -8,7 +8,10 @@ import numpy as np
 
 from ..sims.signals import runs
 
-GRAVITY, RESTITUTION = 9.81, 0.8
+GRAVITY = 9.81
+"""[m/s^2]"""
+RESTITUTION = 0.8
+"""of a basketball on the ground"""
 OFF = (0.15, 0.3)
 """What may be missing to the restitution, and what share of gravity."""
 FEWEST = 3
@@ -35,7 +38,9 @@ def physics(ball: np.ndarray, held: np.ndarray, rate: float) -> Physics:
     """Of a path (frames, 3) [m] that hands have while it is `held` (frames,). All arcs are parabolas of one
     acceleration, by least squares; a bounce is where two of them meet, about a flight's lowest frame, which
     belongs to neither."""
-    height, arcs, meets = ball[:, 2], [], []
+    height = ball[:, 2]
+    arcs: list[np.ndarray] = []
+    meets: list[tuple[int, int]] = []
     for a, b in runs(~held):
         low = a + int(np.argmin(height[a : b + 1]))
         parts = (a, low), (low + 1, b + 1)

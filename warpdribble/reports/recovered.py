@@ -1,10 +1,10 @@
 """The table of docs/dribbling.md on recovered balls: a recorded ball is hidden, and found again from the
 motion of the hands by inference and simulation, the root held.
 
-    python -m warpdribble.reports.recovered FOLDER [OUT.json] [SECONDS] [SHARE] [GOOD]
+    python -m warpdribble.reports.recovered FOLDER [OUT.json] [SECONDS] [SHARE] [LOOSE]
 
 tries every BallPlay-M clip in FOLDER whose ball bounces between hands, each for at most so many seconds of
-one core. SHARE: of each contact that H has (P1 8), 1 where nothing is said. GOOD: the cost at which a window
+one core. SHARE: of each contact that H has (P1 8), 1 where nothing is said. LOOSE: the cost at which a window
 is done, where other than usual. What OUT.json has already is not measured again.
 """
 
@@ -37,8 +37,12 @@ from .recorded import Physics, physics
 
 NEAR = 0.25
 """[s] Bounces farther apart are not the same."""
-WHOLE, LATE, LOST = "whole", "time", "ball lost"
-"""How a search ends: the clip is found, its time is up, nothing keeps the ball."""
+WHOLE = "whole"
+"""How a search ends: the clip is found;"""
+LATE = "time"
+"""its time is up;"""
+LOST = "ball lost"
+"""nothing that was tried keeps the ball."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def fewer(graph: ControlGraph, share: float) -> ControlGraph:
     return replace(graph, touch=touch)
 
 
-def recover(model: Model, path: Path, limit: float, share: float, good: float | None) -> Recovered | None:
+def recover(model: Model, path: Path, limit: float, share: float, loose: float | None) -> Recovered | None:
     """A clip; None where no ball was recorded, or it does not bounce between hands."""
     motion, _ = read_clip(path)
     result = retargeted(model, motion)
@@ -140,7 +144,7 @@ def recover(model: Model, path: Path, limit: float, share: float, good: float | 
     ball = inferred_ball(model, result.reference, result.scale)
     if ball is None or not ball.checkpoints:
         return Recovered(path.name, "no ball inferred", 0.0, **own)
-    context, began = _context(model, result.reference, ball, share, good), time.process_time()
+    context, began = _context(model, result.reference, ball, share, loose), time.process_time()
     try:
         learner: Any = stage.make(context)
     except ValueError as error:
@@ -163,14 +167,14 @@ def recover(model: Model, path: Path, limit: float, share: float, good: float | 
     return Recovered(path.name, ended, seconds, covered, fingers=fingers, **own)
 
 
-def _context(model: Model, reference: Any, ball: Ball, share: float, good: float | None) -> Context:
+def _context(model: Model, reference: Any, ball: Ball, share: float, loose: float | None) -> Context:
     """What the usual method finds the ball of a reference from whose root is held."""
     plays = np.asarray(ball.touch.any(axis=0))
     joint_q = with_ready_hands(model, reference.joint_q, plays)
     joint_q[:, model.q_slice(model.roles.one("ball_joint"))][:, :3] = ball.path
     graph = fewer(tracked_graph(model, replace(reference, joint_q=joint_q), ball=ball), share)
     search = NewtonConfig(search=PaperConfig(generations=60))  # rather an end than a long search
-    return Context(graph, stage.BallConfig(newton=search if good is None else replace(search, good=good)))
+    return Context(graph, stage.BallConfig(newton=search if loose is None else replace(search, loose=loose)))
 
 
 NUMBERS = {
@@ -230,7 +234,7 @@ def table(rows: list[Recovered]) -> str:
     return "\n".join(lines)
 
 
-def main(folder: Path, out: Path, limit: float, share: float, good: float | None) -> None:
+def main(folder: Path, out: Path, limit: float, share: float, loose: float | None) -> None:
     model, rows, seen = Model.load("player"), [], set()
     done = {row["clip"]: row for row in json.loads(out.read_text())} if out.exists() else {}
     for path in sorted(folder.rglob("*.pt")):
@@ -240,7 +244,7 @@ def main(folder: Path, out: Path, limit: float, share: float, good: float | None
         seen.add(copy)
         if path.name in done:
             rows.append(Recovered(**done[path.name]))
-        elif (row := recover(model, path, limit, share, good)) is not None:
+        elif (row := recover(model, path, limit, share, loose)) is not None:
             rows.append(row)
             print(row, flush=True)
             out.write_text(json.dumps([vars(r) for r in rows]))
@@ -250,7 +254,7 @@ def main(folder: Path, out: Path, limit: float, share: float, good: float | None
 if __name__ == "__main__":
     if len(sys.argv) < 2:
         raise SystemExit(
-            "usage: python -m warpdribble.reports.recovered FOLDER [OUT.json] [SECONDS] [SHARE] [GOOD]"
+            "usage: python -m warpdribble.reports.recovered FOLDER [OUT.json] [SECONDS] [SHARE] [LOOSE]"
         )
     given = dict(enumerate(sys.argv))
     main(
