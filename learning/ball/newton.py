@@ -58,6 +58,8 @@ class NewtonConfig:
     """[m] from a forearm to the ball"""
     offset: float = 1.0
     """[rad] of an offset"""
+    change: float = 0.5
+    """[rad] of an offset from that of the fragment before"""
     step: float = 0.01
     """[rad] of the differences"""
     damping: tuple[float, ...] = (1e-4, 1e-3, 1e-2, 0.1, 0.3, 1.0, 10.0, 100.0)
@@ -292,7 +294,10 @@ class Newton(Cycles):
                 parts.append(share * way * (1.0 - task.model.ball_radius / np.maximum(length, TINY)) / c.tip)
         parts.append(np.maximum(c.clear - tried.room[reached], 0.0) / self.room)
         flat = [part.transpose(1, 0, 2).reshape(len(x), -1) for part in parts]
-        errors = np.concatenate([*flat, x / (c.offset * np.sqrt(x.shape[1]))], axis=1)
+        before = np.broadcast_to(self.last[k[0] - 1], (1, len(x), tried.action.shape[-1]))
+        changes = np.diff(tried.action, axis=0, prepend=before).transpose(1, 0, 2).reshape(len(x), -1)
+        size = np.sqrt(x.shape[1])
+        errors = np.concatenate([*flat, x / (c.offset * size), changes / (c.change * size)], axis=1)
         return np.clip(np.nan_to_num(errors, nan=WORST), -WORST, WORST)
 
     def _slope(self, k: np.ndarray, at: Point) -> np.ndarray:

@@ -1,13 +1,17 @@
 """Gauss-Newton steps against least squares, and whole cycles of the authored dribble: played back, gone on
 with from a checkpoint, and gone on with by CMA-ES."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from warpdribble.learning.ball.cycles import moved
-from warpdribble.learning.ball.newton import Newton, corrected, steps_down
+from warpdribble.learning.ball.newton import Newton, NewtonConfig, corrected, steps_down
 from warpdribble.learning.ball.optimised import Optimised, played
 from warpdribble.learning.ball.paper import Paper, PaperConfig
+from warpdribble.learning.methods.ball import BallConfig, make
+from warpdribble.learning.runs.stage import Context
 from warpdribble.learning.starts import Starts
 from warpdribble.learning.tasks.arms import Arms
 
@@ -76,6 +80,18 @@ def test_fingers_are_near_the_ball_in_every_cycle(learner, cycles):
     assert all(report.found for report in reports) and reports[-1].fresh
     assert max(report.fingers for report in reports) < 2.0
     assert [report.iteration for report in reports] == list(range(1, cycles + 1))
+
+
+def test_offsets_change_little_from_fragment_to_fragment(learner, dribbled, needs, cycles):
+    """Half as much as where changes cost nothing; then arms twitch. The ball is held as closely."""
+    config = BallConfig(method="newton", cycles=cycles, newton=replace(NewtonConfig(), change=1e9))
+    other = make(Context(dribbled, config, needs=needs))
+    while not other.done:
+        other.iterate()
+    found = [Optimised.of(one.result) for one in (learner[0], other)]
+    steps, fingers = zip(*((np.diff(f.action, axis=0).std(), np.nanmean(f.fingers)) for f in found))
+    assert steps[0] < 0.7 * steps[1]
+    assert fingers[0] < fingers[1] + 0.003
 
 
 def test_only_hands_that_act_are_moved(learner, dribbled):
