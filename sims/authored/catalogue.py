@@ -11,6 +11,7 @@ from ..ball.ball import Ball, find_checkpoints
 from ..ball.hands import find_hands
 from ..model import Model
 from ..reference.reference import Reference
+from .between_legs import between_legs
 from .carry import carry
 from .dribble import dribble_right
 from .run_dribble import run_dribble
@@ -42,6 +43,7 @@ AUTHORED: dict[str, Callable[[Model], tuple[Reference, np.ndarray, np.ndarray]]]
     "waist": waist,
     "switch_hands": switch,
     "run_dribble": run_dribble,
+    "between_legs": between_legs,
 }
 """Name -> its author: reference, way of the ball (rows, 3) [m], which hand has it (rows, 2) bool."""
 
