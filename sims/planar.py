@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 
 def planar(joint_q: np.ndarray) -> np.ndarray:
-    """Place and heading (n, 3) [m, m, rad] over the ground of roots, joint_q (n, 7 or more); not finite where
-    they are not."""
+    """Place and heading (n, 3) [m, m, rad] over the ground of roots, joint_q or poses (n, 7 or more); not
+    finite where they are not."""
     return np.stack([joint_q[:, 0], joint_q[:, 1], heading(joint_q[:, 3:7])], axis=1)
 
 
@@ -26,6 +26,13 @@ def relative(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
     x, y = (b - a)[:, :2].T
     return np.stack([c * x + s * y, c * y - s * x, wrapped(b[:, 2] - a[:, 2])], axis=1)
+
+
+def points_from(a: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (n, k, 3) [m] of the world as seen from planar poses (n, 3); heights stay."""
+    c, s = np.cos(a[:, 2, None]), np.sin(a[:, 2, None])
+    x, y = np.moveaxis(points[..., :2] - a[:, None, :2], -1, 0)
+    return np.stack([c * x + s * y, c * y - s * x, points[..., 2]], axis=-1)
 
 
 def composed(a: np.ndarray, b: np.ndarray) -> np.ndarray:

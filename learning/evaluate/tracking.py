@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...sims.model import Model, gaps, pose
+from ...sims.planar import planar, points_from, relative
 from ...sims.reference.reference import difference
 from ...sims.trajectory import Trajectory
 
@@ -44,7 +45,11 @@ class Tracking:
     angle_error: np.ndarray
     """(frames,) [rad], mean over the joints of bodies that are not light."""
     position_error: np.ndarray
-    """(frames,) [m], mean over the same bodies, in the world."""
+    """(frames,) [m], mean over the same bodies, each seen from its player's facing frame: drift does not
+    count."""
+    drift: np.ndarray
+    """(frames, 3) [m, m, rad] facing frame of the player, seen from that of the reference: how far ahead, how
+    far to the left, how far turned."""
     fallen: np.ndarray
     """(frames,) bool."""
     contacts: dict[str, np.ndarray]
@@ -69,7 +74,8 @@ def track(model: Model, seen: Trajectory) -> Tracking:
     body_q, wanted = seen.body_q.astype(float), pose.forward(model, seen.reference_q)
     root = model.body(model.roles.one("root_body"))
     counted = [b for b in model.descendants(root) if model.body_mass[b] > LIGHT]
-    off = np.linalg.norm(body_q[:, counted, :3] - wanted[:, counted, :3], axis=-1)
+    frames, goals = planar(body_q[:, root]), planar(wanted[:, root])
+    off = points_from(frames, body_q[:, counted, :3]) - points_from(goals, wanted[:, counted, :3])
     apart = difference(model, seen.reference_q, seen.joint_q.astype(float))
     joints = [
         n for n in model.joint_names if model.joint_body(n) in counted and model.joint_type(n) != "free"
@@ -77,7 +83,8 @@ def track(model: Model, seen: Trajectory) -> Tracking:
     angles = [np.linalg.norm(apart[:, model.dof_slice(n)], axis=-1) for n in joints]
     return Tracking(
         angle_error=np.mean(angles, axis=0) if angles else np.zeros(len(body_q)),
-        position_error=off.mean(axis=1),
+        position_error=np.linalg.norm(off, axis=-1).mean(axis=1),
+        drift=relative(goals, frames),
         fallen=body_q[:, root, 2] < FALLEN * wanted[:, root, 2],
         contacts=find_contacts(model, body_q),
         root=body_q[:, root, :3],

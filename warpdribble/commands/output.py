@@ -102,6 +102,13 @@ def say_trajectory(model: Model, seen: Trajectory, root: str, cycles: float | No
         f"tracking  joints {np.degrees(found.angle_error.mean()):.1f} degrees, "
         f"bodies {100.0 * found.position_error.mean():.1f} cm off (means, fingers left out)"
     )
+    if root == "free":
+        place = np.linalg.norm(found.drift[:, :2], axis=1)
+        turn = np.degrees(np.abs(found.drift[:, 2]))
+        say(
+            f"drift     {place[-1]:.2f} m and {turn[-1]:.0f} degrees from the reference at the end, "
+            f"{place.max():.2f} m and {turn.max():.0f} degrees at most"
+        )
     if root == "tracked":
         limb, slides = found.limbs[0], np.nanmax([0.0, *(limb.sliding for limb in found.limbs)])
         say(

@@ -8,6 +8,7 @@ from warpdribble.learning.evaluate.tracking import FALLEN, LIGHT, touches, track
 from warpdribble.sims import Model
 from warpdribble.sims.authored.dribble import dribble_right
 from warpdribble.sims.model import pose
+from warpdribble.sims.planar import planar
 from warpdribble.sims.trajectory import Trajectory
 
 
@@ -74,12 +75,33 @@ def test_falls_are_counted(full, dribbled):
     assert track(full, seen(full, low, dribbled)).falls == 0
 
 
-def test_a_turned_player_is_off_in_its_places(full, dribbled):
-    """Turned about the vertical, every joint as it should be."""
-    turned, by = np.array(dribbled), Rotation.from_euler("z", 0.5)
-    turned[:, 3:7] = (by * Rotation.from_quat(turned[:, 3:7])).as_quat()
-    found = track(full, seen(full, turned, dribbled))
-    assert found.angle_error.max() < 1e-6 and found.position_error.min() > 0.02
+def test_drift_is_told_apart_from_being_off(full, dribbled):
+    """Ever further and ever more turned, every joint as it should be: nothing is off; a bent knee is off by
+    the same wherever it happens."""
+    strayed, bent = np.array(dribbled), np.array(dribbled)
+    bent[:, full.q_slice("l_knee")] += 0.3
+    both, share = np.array(bent), np.linspace(0.0, 1.0, len(dribbled))
+    by = Rotation.from_rotvec(np.outer(2.5 * share, [0.0, 0.0, 1.0]))
+    for rows in (strayed, both):
+        rows[:, :2] += share[:, None] * [30.0, -40.0]
+        rows[:, 3:7] = (by * Rotation.from_quat(rows[:, 3:7])).as_quat()
+    found = track(full, seen(full, strayed, dribbled))
+    assert found.angle_error.max() < 1e-6 and found.position_error.max() < 1e-9
+    assert np.hypot(*found.drift[-1, :2]) == pytest.approx(50.0)
+    np.testing.assert_allclose(found.drift[:, 2], 2.5 * share, atol=1e-9)
+    knees = [track(full, seen(full, rows, dribbled)).position_error for rows in (bent, both)]
+    np.testing.assert_allclose(*knees, atol=1e-9)
+
+
+def test_drift_is_seen_from_where_the_reference_faces(full, dribbled):
+    """Facing +Y, a metre along +Y is ahead and one along -X is to the left."""
+    faced, moved = np.array(dribbled), np.array(dribbled)
+    by = Rotation.from_euler("z", 0.5 * np.pi)
+    straight = by * Rotation.from_euler("z", -planar(dribbled)[:, 2:]) * Rotation.from_quat(faced[:, 3:7])
+    faced[:, 3:7] = moved[:, 3:7] = straight.as_quat()
+    moved[:, :2] += [-0.5, 2.0]
+    drift = track(full, seen(full, moved, faced)).drift
+    np.testing.assert_allclose(drift, np.tile([2.0, 0.5, 0.0], (len(drift), 1)), atol=1e-9)
 
 
 def test_without_a_ball_there_are_feet(full, dribbled):
