@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .model import Model
 
 
 @dataclass(frozen=True)
@@ -46,3 +50,27 @@ class Trajectory:
             body_q=self.body_q[:frames],
             reference_q=self.reference_q[:frames],
         )
+
+
+def centred(model: Model, seen: Trajectory) -> Trajectory:
+    """The same moved over the ground, so that the player's root begins above the origin. Where something
+    stands fixed in the world, nothing is moved."""
+    fixed = any(joint.kind != "free" for joint in model.joints if joint.parent == 0)
+    fixed = fixed or any(model.body_link[s.body] == 0 for s in model.shapes if s.body >= 0)
+    if fixed or any(s.body < 0 and s.kind != "plane" for s in model.shapes):
+        return seen
+    off = seen.body_q[0, model.body(model.roles.one("root_body")), :2]
+    free = [joint.q.start + axis for joint in model.joints if joint.kind == "free" for axis in (0, 1)]
+
+    def moved(values: np.ndarray, place: object, by: np.ndarray) -> np.ndarray:
+        out = np.array(values)
+        out[place] -= by
+        return out
+
+    rows, shift = (slice(None), free), np.tile(off, len(free) // 2)
+    return replace(
+        seen,
+        joint_q=moved(seen.joint_q, rows, shift),
+        body_q=moved(seen.body_q, (..., slice(0, 2)), off),
+        reference_q=moved(seen.reference_q, rows, shift),
+    )

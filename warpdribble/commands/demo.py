@@ -8,7 +8,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from .console import bar, check_range, compiling, find_device, say, warmed
-from .output import Outputs, check_outputs, say_trajectory, write_outputs
+from .output import Outputs, check_outputs, write_outputs
 
 FIRST = "dribble-right-authored"
 """The controller that is shown when none is named."""
@@ -67,8 +67,7 @@ class Demo(Outputs):
         if self.push:
             say(f"pushed    with {self.push:g} N for {PUSH_TIME:g} s after {when * graph.period:.1f} s")
         cycles = fragments / graph.cycle
-        tracking = say_trajectory(task.model, seen[0], "free", cycles=cycles)
-        write_outputs(self, task.model, seen[0], tracking, f"{one.skill['name']}, learned", "free")
+        write_outputs(self, task.model, seen[0], f"{one.skill['name']}, learned", "free", cycles)
         say(
             "next      open the take in Blender (or any USD viewer); others: warpdribble demo --list;\n"
             "          let it follow your own clip, warpdribble simulate CLIP.bvh --repeat 10;\n"

@@ -8,7 +8,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from .console import bar, check_new, check_range, compiling, find_device, say, warmed
-from .output import Outputs, check_outputs, say_trajectory, write_outputs
+from .output import Outputs, check_outputs, write_outputs
 
 
 @dataclass
@@ -66,8 +66,7 @@ class Export(Outputs):
             f"learned in {one.iteration} iterations"
         )
         cycles = fragments / one.graph.cycle if one.stage.ball else None
-        tracking = say_trajectory(task.model, seen[0], "free", cycles)
-        write_outputs(self, task.model, seen[0], tracking, f"{one.skill['name']}, learned", "free")
+        write_outputs(self, task.model, seen[0], f"{one.skill['name']}, learned", "free", cycles)
         return 0
 
     def _network(self, path: Path) -> int:

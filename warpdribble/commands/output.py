@@ -20,8 +20,9 @@ class Outputs:
 
     out: Path = Path("out/take.usdc")
     """The take: .usda, .usdc or .usdz. The pictures (.png) and the replay (.html) go beside it."""
-    skin: bool = False
-    """One smooth body over the player, in the take and the replay, instead of its shapes."""
+    skin: bool = True
+    """The player as one smooth body, in the take and the replay; --no-skin shows the shapes that are
+    simulated, which is how a model of your own is shown."""
     usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
     """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
     html: bool = True
@@ -45,14 +46,20 @@ def check_outputs(command: Outputs) -> None:
 
 
 def write_outputs(
-    command: Outputs, model: Model, seen: Trajectory, tracking: Tracking, source: str, root: str
+    command: Outputs, model: Model, seen: Trajectory, source: str, root: str, cycles: float | None = None
 ) -> None:
-    """Write all of it and say where. source: where the motion comes from; root: what holds the root."""
+    """Say how it went, write all of it, moved to the middle of the court, and say where. source: where the
+    motion comes from; root: what holds the root; cycles: so many of them a policy tried to keep the ball."""
     from .. import __version__
+    from ..sims.trajectory import centred
+    from ..skin.flesh import is_player
     from ..takes import Take, validate, write_plots, write_sheet, write_take
     from ..takes.usdjoints import left_out
     from ..web import write_replay
 
+    skin = command.skin and is_player(model)
+    seen = centred(model, seen)
+    tracking = say_trajectory(model, seen, root, cycles)
     take = Take.of(
         model,
         seen.body_q.astype(float),
@@ -65,7 +72,7 @@ def write_outputs(
     picture = command.out.with_suffix(".png")
     plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
     title = f"{source}, root {root}"
-    write_take(command.out, take, skin=command.skin, joints=command.usd_joints)
+    write_take(command.out, take, skin=skin, joints=command.usd_joints)
     write_sheet(picture, take, heights, tracking.contacts, title)
     write_plots(
         plots,
@@ -78,7 +85,7 @@ def write_outputs(
         title,
     )
     if command.html:
-        write_replay(replay, take, tracking.contacts, title, skin=command.skin)
+        write_replay(replay, take, tracking.contacts, title, skin=skin)
     errors = validate(command.out)
     state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
     for lost in left_out(model, command.usd_joints):
@@ -89,8 +96,8 @@ def write_outputs(
         say(f"replay    {replay} (open it in a browser)")
 
 
-def say_trajectory(model: Model, seen: Trajectory, root: str, cycles: float | None = None) -> Tracking:
-    """Say how it went, and measure it. cycles: so many of them a policy tried to keep the ball."""
+def say_trajectory(model: Model, seen: Trajectory, root: str, cycles: float | None) -> Tracking:
+    """Say how it went, and measure it."""
     import numpy as np
 
     from ..learning.evaluate.tracking import track

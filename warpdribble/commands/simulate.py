@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from .clip_input import ClipInput, refuse_for_skill
 from .console import bar, compiling, find_device, say, warmed
-from .output import Outputs, check_outputs, say_trajectory, write_outputs
+from .output import Outputs, check_outputs, write_outputs
 
 if TYPE_CHECKING:
     from ..learning.rollout import Controller
@@ -71,7 +71,7 @@ class Simulate(ClipInput, Outputs):
                 task = follow(model, reference, tries, "tracked", self.device, progress)
         begin = starts(model, reference, tries, one.ball is not None)
         seen = _record(task, OpenLoop(), begin).first(reference.frame_count)
-        write_outputs(self, model, seen, say_trajectory(model, seen, self.root), _title(one), self.root)
+        write_outputs(self, model, seen, _title(one), self.root)
         return 0
 
     def _skill(self) -> Skill:
