@@ -194,27 +194,44 @@ def test_help_is_given(capsys, arguments):
 
 
 def test_demo_leaves_a_valid_take_and_a_picture(capsys, tmp_path):
+    from pxr import Usd
+
     out = tmp_path / "new" / "demo.usdc"
     assert main(["demo", "--seconds", "1.4", "--out", str(out)]) == 0
     assert validate(out) == []
     beside = ["demo.html", "demo.plots.png", "demo.png", "demo.usdc"]
     assert sorted(p.name for p in out.parent.iterdir()) == beside
     said = capsys.readouterr().out
-    for word in ("real time", "tracking", "falls", "bounces", "next", str(out)):
+    for word in ("real time", "tracking", "drift", "falls", "bounces", "next", str(out)):
         assert word in said
+    stage = Usd.Stage.Open(str(out))
+    assert stage.GetPrimAtPath("/World/Player/Skin/Body_visual")
+    start = stage.GetAttributeAtPath("/World/Player/pelvis.xformOp:translate").Get(0)
+    assert abs(start[0]) < 1e-6 and abs(start[1]) < 1e-6
 
 
 def test_a_take_as_asked_for(capsys, tmp_path):
     from pxr import Usd
 
     out = tmp_path / "as" / "demo.usda"
-    arguments = ["demo", "--seconds", "0.7", "--skin", "--usd-joints", "d6", "--no-html", "--out", str(out)]
+    arguments = [
+        "demo",
+        "--seconds",
+        "0.7",
+        "--no-skin",
+        "--usd-joints",
+        "d6",
+        "--no-html",
+        "--out",
+        str(out),
+    ]
     assert main(arguments) == 0
     assert validate(out) == []
     layers = [f"demo.{name}" for name in ("animation.usdc", "physics.usda", "plots.png", "png", "scene.usdc")]
     assert sorted(p.name for p in out.parent.iterdir()) == [*layers, "demo.usda"]
     stage = Usd.Stage.Open(str(out))
-    assert stage.GetPrimAtPath("/World/Player/Skin/Body_visual")
+    assert stage.GetPrimAtPath("/World/Player/pelvis/pelvis_visual")
+    assert not stage.GetPrimAtPath("/World/Player/Skin")
     assert stage.GetPrimAtPath("/World/Player/Joints/l_hip").GetTypeName() == "PhysicsJoint"
     assert "replay" not in capsys.readouterr().out
 

@@ -163,7 +163,7 @@ PLAYER = [*MIDDLE, *SIDE, *(lump.mirrored() for lump in SIDE)]
 
 def of(model: Model) -> list[Lump]:
     """The primitives of a model: the player's, and for every other body its own shapes."""
-    drawn = [lump for lump in PLAYER if lump.body in model.body_names] if _is_player(model) else []
+    drawn = [lump for lump in PLAYER if lump.body in model.body_names] if is_player(model) else []
     covered = {lump.body for lump in drawn}
     balls = ball_bodies(model)
     for shape in model.shapes:
@@ -193,7 +193,7 @@ def ball_bodies(model: Model) -> set[int]:
     return model.named_bodies("ball") | {b for b, name in enumerate(model.body_names) if name == "ball"}
 
 
-def _is_player(model: Model) -> bool:
+def is_player(model: Model) -> bool:
     """Whether it is the model that the primitives were shaped for; another of the same names has other
     sizes."""
     return model.path.resolve() == asset("player.xml").resolve()

@@ -1,4 +1,4 @@
-"""What surrounds a take in its USD file: meshes with materials, a court, lights and a camera."""
+"""What surrounds a take in its USD file: meshes with materials, a court and lights."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def add_mesh(stage: Usd.Stage, path: str, mesh: Mesh, colour: Vector | None) -> 
 
 
 def add_surroundings(stage: Usd.Stage, path_of_bodies: np.ndarray) -> None:
-    """Court, lights, and a camera that sees every position in path_of_bodies (n, 3) [m]."""
+    """Lights, and a court below every position in path_of_bodies (n, 3) [m]."""
     UsdGeom.Xform.Define(stage, "/World/Court")
     for name, (mesh, colour) in zip(
         ("floor", "lines"), court(float(np.abs(path_of_bodies[:, :2]).max()) + 3.0)
@@ -98,34 +98,12 @@ def add_surroundings(stage: Usd.Stage, path_of_bodies: np.ndarray) -> None:
     sun.AddRotateXYZOp().Set(Gf.Vec3f(35.0, 25.0, 0.0))
     sky = UsdLux.DomeLight.Define(stage, "/World/Sky")
     sky.CreateIntensityAttr(0.6)
-    _add_camera(stage, path_of_bodies)
 
 
 def court(reach: float) -> list[tuple[Mesh, Vector]]:
     """Floor and lines with their colours; the floor goes on to `reach` [m] from the origin, or further."""
     half = np.maximum(COURT_HALF, reach)
     return [(_slab(-half, half, -0.06, -0.004), COURT_COLOUR), (_lines(), LINE_COLOUR)]
-
-
-def _add_camera(stage: Usd.Stage, path_of_bodies: np.ndarray) -> None:
-    low, high = path_of_bodies.min(axis=0), path_of_bodies.max(axis=0)
-    centre = 0.5 * (low + high)
-    centre[2] = 0.9
-    distance = 3.6 + 1.1 * float(np.linalg.norm((high - low)[:2]))
-    back = np.array([0.80, -0.55, 0.25])
-    back /= np.linalg.norm(back)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    frame = np.eye(4)
-    frame[:3, :3] = [right, np.cross(back, right), back]
-    frame[3, :3] = centre + distance * back
-    camera = UsdGeom.Camera.Define(stage, "/World/Camera")
-    camera.AddTransformOp().Set(Gf.Matrix4d(frame.tolist()))
-    camera.CreateFocalLengthAttr(35.0)
-    camera.CreateHorizontalApertureAttr(36.0)
-    camera.CreateVerticalApertureAttr(20.25)
-    camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 200.0))
-    camera.CreateFocusDistanceAttr(distance)
 
 
 def _slab(low: Point, high: Point, bottom: float, top: float) -> Mesh:

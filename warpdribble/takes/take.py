@@ -19,7 +19,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from ..sims.files import check_folder, whole
 from ..sims.model import Model, Shape
-from . import crowd, figure, scene
+from . import camera, crowd, figure, scene
 from .usdjoints import left_out
 
 SUFFIXES = (".usda", ".usdc", ".usdz")
@@ -196,11 +196,12 @@ def _write(path: Path, take: Take, skin: bool, joints: str, layered: bool, spaci
     scene.define_world(stage)
     if len(take.worlds) == 1:
         figure.add(stage, "/World", take.world(0), edit, skin, joints)
-        places = take.worlds[0]
+        places = take.worlds
     else:
         places = crowd.add(stage, take, edit, skin, joints, spacing)
     stage.SetEditTarget(edit["scene"])
     scene.add_surroundings(stage, places[..., :3].reshape(-1, 3))
+    camera.add(stage, take, edit, places)
     figure.add_static(stage, take, edit)
     del stage
     if layered:
