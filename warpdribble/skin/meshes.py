@@ -11,6 +11,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from ..sims.model import Shape
+from .cut import Net, cut
 
 BOX_ROUNDING = 0.35
 """Radius of a box's edges, as a share of its smallest half size."""
@@ -55,19 +56,51 @@ def weld(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return mesh.points[first], inverse.reshape(-1)[mesh.faces]
 
 
+def normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(points, 3), outward, unit length: those of the faces around each point, by area."""
+    of_face = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    total = [np.bincount(faces.ravel(), np.repeat(of_face[:, k], 3), len(points)) for k in range(3)]
+    return _unit(np.stack(total, axis=1))
+
+
 def faces_of(mesh: Mesh, chosen: np.ndarray) -> Mesh:
     """The part of a mesh made of the chosen faces (faces,) bool."""
     used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
     return Mesh(mesh.points[used], mesh.normals[used], faces.reshape(-1, 3))
 
 
-def ball_seams(mesh: Mesh) -> np.ndarray:
-    """Which faces (faces,) bool of a ball's mesh, centred on the origin, belong to the seams."""
-    centre = mesh.points[mesh.faces].mean(axis=1)
-    x, y, z = (centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
+def is_ball(mesh: Mesh) -> bool:
+    """Whether a mesh is a sphere around the origin."""
+    size = np.linalg.norm(mesh.points, axis=1)
+    return bool(np.ptp(size) < 1e-6 * size.max())
+
+
+def ball_parts(mesh: Mesh) -> tuple[Mesh, Mesh]:
+    """The panels and the seams of a ball's mesh, a sphere around the origin that is cut along the seams'
+    edges."""
+    sphere = _Sphere(float(np.linalg.norm(mesh.points[0])))
+    net = cut(Net.of(mesh.points, mesh.faces), sphere, seam_field, 1)
+    whole = Mesh(net.points, _unit(net.points), net.faces)
+    return faces_of(whole, net.region == 0), faces_of(whole, net.region == 1)
+
+
+def seam_field(points: np.ndarray) -> np.ndarray:
+    """How far (points,) from the edges of a ball's seams points (n, 3) around its centre are, in its radii;
+    negative on a seam."""
+    x, y, z = _unit(points).T
     opening = np.radians(42.0) + np.radians(10.0) * np.cos(2.0 * np.arctan2(z, x))
-    curved = np.abs(np.arccos(np.abs(y)) - opening)
-    return np.minimum(np.minimum(np.abs(x), np.abs(z)), curved) < SEAM_HALF_WIDTH
+    curved = np.abs(np.arccos(np.clip(np.abs(y), 0.0, 1.0)) - opening)
+    return np.asarray(np.minimum(np.minimum(np.abs(x), np.abs(z)), curved) - SEAM_HALF_WIDTH)
+
+
+@dataclass(frozen=True)
+class _Sphere:
+    """A surface to cut on."""
+
+    radius: float
+
+    def slope(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.linalg.norm(points, axis=1) - self.radius, _unit(points)
 
 
 @lru_cache(maxsize=256)

@@ -96,9 +96,8 @@ def coloured(shapes: list[Shape], seams: bool) -> list[tuple[meshes.Mesh, Vector
     parts = []
     for colour in dict.fromkeys(_colour(s) for s in shapes):
         mesh = meshes.merge([meshes.shape_mesh(s) for s in shapes if _colour(s) == colour])
-        if seams:
-            seam = meshes.ball_seams(mesh)
-            parts += [(meshes.faces_of(mesh, ~seam), colour), (meshes.faces_of(mesh, seam), SEAM_COLOUR)]
+        if seams and meshes.is_ball(mesh):
+            parts += zip(meshes.ball_parts(mesh), (colour, SEAM_COLOUR), strict=True)
         else:
             parts.append((mesh, colour))
     return parts

@@ -3,13 +3,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdShade
 from scipy.spatial.transform import Rotation
 
 from warpdribble.sims import Model
 from warpdribble.sims.model import pose
-from warpdribble.skin.meshes import ball_seams, shape_mesh
+from warpdribble.skin.meshes import ball_parts, merge, seam_field, shape_mesh, weld
+from warpdribble.skin.surface_net import open_points
 from warpdribble.takes import take as take_module
+from warpdribble.takes.figure import coloured
 from warpdribble.takes.take import Take, TakeError, check_writable, validate, write_take
 
 FPS = 50.0
@@ -243,9 +246,27 @@ def test_meshes_enclose_their_shape_and_face_outward(kind):
     assert np.sum(faces * shown, axis=1).min() > 0.5
 
 
-def test_seams_are_a_small_part_of_the_ball():
+def test_the_ball_is_cut_along_its_seams():
+    """Panels and seams close to one sphere, the edges between them lie on the seams' own, and the seams' area
+    is that of points strewn evenly over a sphere."""
     ball = SimpleNamespace(
         name="ball", kind="sphere", size=[0.1193], pos=np.zeros(3), quat=[0.0, 0.0, 0.0, 1.0]
     )
-    share = ball_seams(shape_mesh(ball)).mean()
-    assert 0.03 < share < 0.25
+    panels, seams = ball_parts(shape_mesh(ball))
+    points, faces = weld(merge([panels, seams]))
+    whole = trimesh.Trimesh(points, faces, process=False)
+    assert whole.is_watertight and whole.is_winding_consistent
+    assert np.allclose(np.linalg.norm(points, axis=1), 0.1193, atol=1e-6)
+    rim = open_points(seams.faces)
+    assert len(rim) > 500 and np.abs(seam_field(seams.points[rim])).max() * 0.1193 < 1e-6
+    strewn = np.random.default_rng(0).normal(size=(200_000, 3))
+    area = trimesh.Trimesh(seams.points, seams.faces, process=False).area
+    assert area / whole.area == pytest.approx(np.mean(seam_field(strewn) < 0.0), rel=0.02)
+
+
+def test_what_is_no_sphere_has_no_seams(tmp_path):
+    text = """<mujoco><worldbody><body name="ball"><freejoint/><geom type="box" size=".1 .1 .2"/></body>
+    </worldbody></mujoco>"""
+    (tmp_path / "m.xml").write_text(text)
+    shapes = Model.load(tmp_path / "m.xml").shapes
+    assert len(coloured(shapes, seams=True)) == 1
