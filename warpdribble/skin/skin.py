@@ -1,9 +1,9 @@
 """One smooth body over a player: a mesh, how its points follow the bodies, and its regions.
 
-The surface is taken in the zero pose, where limbs are apart, then carried to the pose it is bound in (arms
-half down: dribbling is nearer to that) and drawn onto the surface there. A point follows the bodies near it
+The surface is taken and bound in the zero pose, where limbs are apart: drawn onto that of another pose,
+the skin of the armpits folds over, and a raised arm shows it inside out. A point follows the bodies near it
 along the surface: the nearest primitive's body, diffused over the mesh, so that what is near only through the
-air (two fingers, arm and trunk) stays apart.
+air (two fingers, arm and trunk) stays apart. Then the mesh is cut along the borders of the clothes.
 """
 
 from __future__ import annotations
@@ -12,23 +12,27 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from ..sims.model import Model, pose
-from . import flesh
-from .implicit import Union
-from .meshes import Mesh
-from .surface_net import edges, line, neighbours, sew, surface_net
+from . import clothes, flesh
+from .clothes import Patch
+from .cut import Net, cut, onto, refine
+from .implicit import FAR, Union
+from .meshes import Mesh, normals
+from .surface_net import line, neighbours, sew, surface_net
 
 CELL = 0.0125
 """[m] of the grid; fingers and the head have finer ones."""
 HAND_CELL = 0.0041
 SPREAD = 28
 """Rounds of diffusion of the weights: a joint is smooth over about sqrt(2 x rounds) edges."""
+SOFT_SPREAD = 80
+"""Rounds more about joints that turn far."""
 INFLUENCES = 4
 """Bodies that a point follows at most."""
-LOWERED = 0.55
-"""How far the arms of the bind pose are on the way from the zero pose to the start pose."""
+BENT, FINE = np.radians(30.0), 0.007
+"""[rad] between the normals at an edge's ends from which it is halved, and [m] down to which."""
 
 
 @dataclass(frozen=True)
@@ -75,28 +79,29 @@ def _build(model: Model) -> Skin:
     lumps = flesh.of(model)
     if not lumps:
         raise ValueError("the model has no shapes to put a skin on")
-    zero, bind = poses(model)
+    bind = zero_pose(model)
     body_of = {name: i for i, name in enumerate(model.body_names)}
-    union = Union(lumps, body_of, zero)
-    points, faces = _surface(union, body_of, zero)
-    points = union.project(points, 1)
-    points, border, region, names = _paint(union, points, faces)
+    union = Union(lumps, body_of, bind)
+    points, faces = _surface(union, body_of, bind)
+    points = onto(union, None, points, 2)
     labels = union.bodies[np.argmin(union.distances(points), axis=0)]
-    bodies, weights = _weights(labels, faces, model.nbody)
+    wide = flesh.wide_joints(model)
+    apart = [np.linalg.norm(points - bind[body_of[body], :3], axis=1) - wide[body] for body in wide]
+    soft = np.flatnonzero((np.reshape(apart, (-1, len(points))) < 0.0).any(axis=0))
+    net = Net.of(points, faces, _diffused(labels, faces, model.nbody, soft))
+    patches = [(patch, bind[body_of[patch.body], :3]) for patch in clothes.of(model)]
+    net, names = _painted(_refined(net, union, patches), union, patches)
+    slope = -union.slope(net.points)[1]
+    outward = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
+    bodies, weights = _strongest(net.values, model.nbody)
+    used, region = np.unique(net.region, return_inverse=True)
+    regions, own = [names[k] for k in used], flesh.colours(model)
+    mesh = Mesh(net.points, outward, net.faces)
+    return Skin(mesh, bodies, weights, regions, region, {n: own[n] for n in regions}, bind)
 
-    draft = Skin(Mesh(points, points, faces), bodies, weights, names, region, {}, zero)
-    bound = Union(lumps, body_of, bind)
-    points = _settle(bound, draft.posed(bind), faces, border)
-    slope = -bound.slope(points)[1]
-    normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-    own = flesh.colours(model)
-    return Skin(
-        Mesh(points, normals, faces), bodies, weights, names, region, {n: own[n] for n in names}, bind
-    )
 
-
-def poses(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Body poses (nbody, 7) of the zero pose and of the bind pose."""
+def zero_pose(model: Model) -> np.ndarray:
+    """Body poses (nbody, 7) with all joints at zero."""
     zero = np.array(model.start_q, float)
     for name in model.joint_names:
         q = model.q_slice(name)
@@ -106,14 +111,7 @@ def poses(model: Model) -> tuple[np.ndarray, np.ndarray]:
             zero[q] = 0.0
         else:
             zero[q.start + 3 : q.stop] = [0.0, 0.0, 0.0, 1.0]
-    bind = zero.copy()
-    for name in ("l_shoulder", "r_shoulder"):
-        if name in model.joint_names and model.joint_type(name) == "ball":
-            q = model.q_slice(name)
-            ends = Rotation.from_quat([zero[q], model.start_q[q]])
-            bind[q] = Slerp([0.0, 1.0], ends)(LOWERED).as_quat()
-    at_zero, at_bind = pose.forward(model, np.stack([zero, bind]))
-    return at_zero, at_bind
+    return np.asarray(pose.forward(model, zero[None])[0])
 
 
 def _surface(union: Union, body_of: dict[str, int], zero: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,8 +148,9 @@ def _surface(union: Union, body_of: dict[str, int], zero: np.ndarray) -> tuple[n
     return points, faces
 
 
-def _weights(labels: np.ndarray, faces: np.ndarray, nbody: int) -> tuple[np.ndarray, np.ndarray]:
-    """Bodies and weights (points, INFLUENCES) from the label of each point, diffused."""
+def _diffused(labels: np.ndarray, faces: np.ndarray, nbody: int, soft: np.ndarray) -> np.ndarray:
+    """Weights (points, nbody or more) from the label of each point, diffused; further at the `soft` points
+    (n,): skin that bends within less than its own length folds over."""
     count = len(labels)
     weights = coo_matrix(
         (np.ones(count), (np.arange(count), labels)), shape=(count, max(nbody, INFLUENCES))
@@ -159,63 +158,51 @@ def _weights(labels: np.ndarray, faces: np.ndarray, nbody: int) -> tuple[np.ndar
     mean = neighbours(faces, count)
     for _ in range(SPREAD):
         weights = 0.5 * (weights + mean @ weights)
+    about = mean[soft]
+    for _ in range(SOFT_SPREAD):
+        weights[soft] = 0.5 * (weights[soft] + about @ weights)
+    return weights
+
+
+def _strongest(weights: np.ndarray, nbody: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bodies and weights (points, INFLUENCES), the strongest first."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
     kept = np.take_along_axis(weights, order, axis=1)
     kept[kept < 0.005] = 0.0
     return np.minimum(order, nbody - 1), kept / kept.sum(axis=1, keepdims=True)
 
 
-def _settle(union: Union, points: np.ndarray, faces: np.ndarray, border: np.ndarray) -> np.ndarray:
-    """Carried points evened out along the surface, but for those on a border, and drawn onto it."""
-    mean, near = neighbours(faces, len(points)), union.near(points)
-    for _ in range(2):
-        slope = union.slope(points, near)[1]
-        normal = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-        move = mean @ points - points
-        move -= np.sum(move * normal, axis=1, keepdims=True) * normal
-        move[border] = 0.0
-        points = union.project(points + 0.25 * move, 1, near=near)
-    return union.project(points, 1, near=near)
+def _refined(net: Net, union: Union, patches: list[tuple[Patch, np.ndarray]]) -> Net:
+    """Finer where a border will be cut, and where the surface turns quickly."""
+
+    def wanted(net: Net, pairs: np.ndarray) -> np.ndarray:
+        length = np.linalg.norm(net.points[pairs[:, 0]] - net.points[pairs[:, 1]], axis=1)
+        normal = normals(net.points, net.faces)
+        bent = np.sum(normal[pairs[:, 0]] * normal[pairs[:, 1]], axis=1) < np.cos(BENT)
+        found = bent & (length > FINE)
+        for patch, origin in patches:
+            value = np.full(len(net.points), FAR)
+            near = patch.about(net.points - origin)
+            value[near] = np.abs(patch.field(net.points[near] - origin))
+            found |= (length > patch.edge) & (value[pairs].min(axis=1) < 0.8 * length)
+        return found
+
+    return refine(net, union, wanted, 6)
 
 
-def _paint(
-    union: Union, points: np.ndarray, faces: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Points moved a little so that edges follow the borders of regions; which were moved; the region of each
-    face; the regions' names."""
-    names = sorted({r for lump in union.lumps for r in (lump.region, *(p[0] for p in lump.paint))})
-    best = np.full((len(names), len(points)), np.inf)
-    distances = union.distances(points)
-    for lump, d, i in zip(union.lumps, distances - distances.min(axis=0), range(len(distances))):
-        x = union.local(i, points)
-        if lump.fold:
-            x[:, 1] = np.abs(x[:, 1])
-        behind = np.full(len(points), -np.inf)
-        for region, normal, offset in reversed(lump.paint):
-            h = x @ np.asarray(normal) - offset
-            k = names.index(region)
-            best[k] = np.minimum(best[k], np.maximum(d, np.maximum(behind, -h)))
-            behind = np.maximum(behind, h)
-        k = names.index(lump.region)
-        best[k] = np.minimum(best[k], np.maximum(d, behind))
-    label = np.argmin(best, axis=0)
-    pairs, _ = edges(faces)
-    a, b = pairs[label[pairs[:, 0]] != label[pairs[:, 1]]].T
-    fa = best[label[a], a] - best[label[b], a]
-    fb = best[label[a], b] - best[label[b], b]
-    t = np.clip(fa / np.where(np.abs(fa - fb) > 1e-12, fa - fb, 1.0), 0.0, 1.0)
-    crossing = points[a] + t[:, None] * (points[b] - points[a])
-    near = np.concatenate([np.stack([a, t], 1)[t < 0.5], np.stack([b, 1.0 - t], 1)[t >= 0.5]])
-    spot = np.concatenate([crossing[t < 0.5], crossing[t >= 0.5]])
-    who = near[:, 0].astype(int)
-    total, weight = np.zeros_like(points), np.zeros(len(points))
-    np.add.at(total, who, spot)
-    np.add.at(weight, who, 1.0)
-    moved = np.where(weight[:, None] > 0, total / np.maximum(weight, 1.0)[:, None], points)
-    votes = np.where(weight[faces] > 0, 0.01, 1.0)
-    tally = np.zeros((len(faces), len(names)))
-    for corner in range(3):
-        np.add.at(tally, (np.arange(len(faces)), label[faces[:, corner]]), votes[:, corner])
-    region = np.argmax(tally, axis=1)
-    used = np.unique(region)
-    return moved, weight > 0.0, np.searchsorted(used, region), [names[k] for k in used]
+def _painted(net: Net, union: Union, patches: list[tuple[Patch, np.ndarray]]) -> tuple[Net, list[str]]:
+    """The mesh cut into regions: those of the nearest primitives, and patches upon them; the regions'
+    names."""
+    own = [lump.region for lump in union.lumps]
+    names = list(dict.fromkeys([*own, *(patch.region for patch, _ in patches)]))
+    for number in range(1, len(set(own))):
+        mine = np.array([region == names[number] for region in own])
+
+        def nearer(points: np.ndarray, mine: np.ndarray = mine) -> np.ndarray:
+            distances = union.distances(points)
+            return np.asarray(distances[mine].min(axis=0) - distances[~mine].min(axis=0))
+
+        net = cut(net, union, nearer, number)
+    for patch, origin in patches:
+        net = cut(net, union, lambda x, p=patch, o=origin: p.field(x - o), names.index(patch.region))
+    return net, names

@@ -5,7 +5,8 @@ from scipy.spatial.transform import Rotation
 
 from warpdribble.sims import Model
 from warpdribble.sims.model import pose
-from warpdribble.skin import flesh, skin
+from warpdribble.skin import clothes, flesh, skin
+from warpdribble.skin.cut import onto
 from warpdribble.skin.implicit import Union
 from warpdribble.skin.surface_net import edges, surface_net
 
@@ -93,13 +94,112 @@ def test_a_bent_arm_keeps_its_thickness(built, shipped_player):
     assert after.min() > 0.66 * before.min()
 
 
-def test_regions_cover_the_body_in_straight_borders(built):
-    assert set(built.regions) == {"hair", "jersey", "shoe", "shorts", "skin", "sock", "sole"}
-    assert np.all(np.bincount(built.region, minlength=7) > 150)
-    waist = set(built.mesh.faces[built.region == built.regions.index("jersey")].ravel())
-    waist &= set(built.mesh.faces[built.region == built.regions.index("shorts")].ravel())
-    heights = built.mesh.points[sorted(waist), 2]
-    assert len(heights) > 50 and np.ptp(heights) < 0.006
+POSES = {
+    "raised": {"l_shoulder": (80, 0, 0), "r_shoulder": (-80, 0, 0), "l_elbow": 0, "r_elbow": 0},
+    "to the side": {"l_shoulder": (0, 0, 0), "r_shoulder": (0, 0, 0)},
+    "forward": {"l_shoulder": (0, 0, -85), "r_shoulder": (0, 0, 85)},
+    "hanging": {"l_shoulder": (-75, 0, 0), "r_shoulder": (75, 0, 0)},
+    "running": {"l_hip": (0, -60, 0), "l_knee": 80, "r_hip": (0, 25, 0), "r_knee": 40},
+}
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_no_pose_turns_the_skin_inside_out(built, shipped_player, name):
+    """Less than a square centimetre of its faces, of two square metres, looks the other way than its bodies
+    carry their normals, six with the hollows of bent knees; and it goes on to hold what it holds."""
+    joint_q = np.array(shipped_player.start_q, float)
+    for joint, turn in POSES[name].items():
+        ball = shipped_player.joint_type(joint) == "ball"
+        angle = np.radians(turn)
+        joint_q[shipped_player.q_slice(joint)] = Rotation.from_rotvec(angle).as_quat() if ball else angle
+    body_q = pose.forward(shipped_player, joint_q[None])[0]
+    turns = (Rotation.from_quat(body_q[:, 3:]) * Rotation.from_quat(built.bind_q[:, 3:]).inv()).as_matrix()
+    carried = np.einsum("pk,pkij,pj->pi", built.weights, turns[built.bodies], built.mesh.normals)
+    body = solid(built.posed(body_q), built.mesh.faces)
+    outward = np.sum(body.face_normals * carried[built.mesh.faces].mean(axis=1), axis=1) > 0.0
+    assert 1.5 < body.area < 2.3 and body.area_faces[~outward].sum() < (6e-4 if name == "running" else 1e-4)
+    assert body.volume == pytest.approx(solid(built.mesh.points, built.mesh.faces).volume, rel=0.06)
+
+
+def border(built, a, b):
+    """Points (n, 3) between two regions."""
+    ends = (built.mesh.faces[built.region == built.regions.index(r)] for r in (a, b))
+    return built.mesh.points[np.intersect1d(*(np.unique(e) for e in ends))]
+
+
+def test_regions_cover_the_body(built):
+    clothes = {"hair", "jersey", "shoe", "shorts", "skin", "sock", "sole"}
+    assert set(built.regions) == clothes | {"eye", "iris", "lip"}
+    assert np.all(np.bincount(built.region) > 50)
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "height"),
+    [
+        ("jersey", "shorts", 0.9619 + 0.125),
+        ("shorts", "skin", 0.9619 - 0.398),
+        ("skin", "sock", 0.5254 - 0.345),
+        ("shoe", "sole", 0.0702 - 0.048),
+    ],
+)
+def test_level_borders_are_level(built, above, below, height):
+    found = border(built, above, below)
+    assert len(found) > 50
+    np.testing.assert_allclose(found[:, 2], height, atol=2e-4)
+
+
+def test_borders_lie_on_the_curves_that_are_written(built, shipped_player):
+    """Within a tenth of a millimetre, neckline, armholes, hair, eyes and mouth alike."""
+    pairs = built.mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    owner = np.repeat(built.region, 3)
+    lowest = np.full(len(built.mesh.points), 99)
+    highest = np.full(len(built.mesh.points), -1)
+    np.minimum.at(lowest, pairs.ravel(), np.repeat(owner, 2))
+    np.maximum.at(highest, pairs.ravel(), np.repeat(owner, 2))
+    points = built.mesh.points[lowest < highest]
+    assert len(points) > 1000
+    off = [
+        np.abs(patch.field(points - built.bind_q[shipped_player.body(patch.body), :3]))
+        for patch in clothes.of(shipped_player)
+    ]
+    assert np.min(off, axis=0).max() < 1e-4
+
+
+def test_necklines_and_armholes_do_not_zigzag(built):
+    """From one edge of a border to the next, its direction turns little."""
+    inside = built.mesh.faces[built.region == built.regions.index("jersey")]
+    pairs, counts = edges(inside)
+    rim = pairs[counts == 1]
+    follows = {int(p): rim[(rim == p).any(axis=1)] for p in np.unique(rim)}
+    turns = []
+    for point, both in follows.items():
+        assert len(both) == 2
+        a, b = (built.mesh.points[int(e.sum()) - point] - built.mesh.points[point] for e in both)
+        turns.append(np.degrees(np.pi - np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
+    assert len(turns) > 200 and np.percentile(turns, 98) < 25.0
+
+
+def test_soles_are_flat_and_of_one_colour(built):
+    body = solid(built.mesh.points, built.mesh.faces)
+    under = (body.triangles_center[:, 2] < 0.03) & (body.face_normals[:, 2] < -0.7)
+    assert body.area_faces[under].sum() > 0.03
+    assert set(built.region[under]) == {built.regions.index("sole")}
+    level = (body.triangles_center[:, 2] < 0.03) & (body.face_normals[:, 2] < -0.95)
+    z = built.mesh.points[built.mesh.faces[level], 2]
+    assert z.min() > 0.002 and np.percentile(z, 97) - z.min() < 0.004
+
+
+def test_it_has_a_face(built):
+    """Two eyes and a mouth between brow and chin, alike on both sides, and of their size."""
+    body = solid(built.mesh.points, built.mesh.faces)
+    for region, height, area in (("iris", 1.681, 1.1e-4), ("lip", 1.618, 2.0e-4)):
+        mine = built.region == built.regions.index(region)
+        centre = body.triangles_center[mine]
+        assert centre[:, 0].min() > 0.05
+        assert np.average(centre[:, 2], weights=body.area_faces[mine]) == pytest.approx(height, abs=0.005)
+        sides = [body.area_faces[mine][side].sum() for side in (centre[:, 1] > 0.0, centre[:, 1] < 0.0)]
+        assert sides[0] == pytest.approx(sides[1], rel=0.1)
+        assert sum(sides) > area
 
 
 def test_any_model_gets_a_skin(tmp_path):
@@ -124,11 +224,11 @@ def test_a_model_without_a_body_to_cover_is_refused(tmp_path):
 
 
 def test_the_net_of_a_ball_is_a_ball():
-    lump = flesh.blob("a", "skin", (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
+    lump = flesh.blob("a", (0.0, 0.0, 0.0), (0.1, 0.1, 0.1))
     union = Union([lump], {"a": 0}, np.array([[0.01, 0.02, 0.03, 0.0, 0.0, 0.0, 1.0]]))
     axes = [np.linspace(-0.2, 0.2, n) for n in (41, 51, 37)]
     points, faces = surface_net(union.on_grid(axes), axes)
-    ball = solid(union.project(points, 2), faces)
+    ball = solid(onto(union, None, points), faces)
     assert ball.is_watertight
     assert ball.volume == pytest.approx(4.0 / 3.0 * np.pi * 0.001, rel=0.02)
     assert np.allclose(np.linalg.norm(ball.vertices - [0.01, 0.02, 0.03], axis=1), 0.1, atol=1e-5)
