@@ -60,17 +60,14 @@ def centred(model: Model, seen: Trajectory) -> Trajectory:
     if fixed or any(s.body < 0 and s.kind != "plane" for s in model.shapes):
         return seen
     off = seen.body_q[0, model.body(model.roles.one("root_body")), :2]
-    free = [joint.q.start + axis for joint in model.joints if joint.kind == "free" for axis in (0, 1)]
-
-    def moved(values: np.ndarray, place: object, by: np.ndarray) -> np.ndarray:
-        out = np.array(values)
-        out[place] -= by
-        return out
-
-    rows, shift = (slice(None), free), np.tile(off, len(free) // 2)
+    of_pose, of_q = np.zeros(7), np.zeros(model.nq)
+    of_pose[:2] = off
+    for joint in model.joints:
+        if joint.kind == "free":
+            of_q[joint.q.start : joint.q.start + 2] = off
     return replace(
         seen,
-        joint_q=moved(seen.joint_q, rows, shift),
-        body_q=moved(seen.body_q, (..., slice(0, 2)), off),
-        reference_q=moved(seen.reference_q, rows, shift),
+        joint_q=seen.joint_q - of_q,
+        body_q=seen.body_q - of_pose,
+        reference_q=seen.reference_q - of_q,
     )

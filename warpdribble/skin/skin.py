@@ -204,5 +204,9 @@ def _painted(net: Net, union: Union, patches: list[tuple[Patch, np.ndarray]]) ->
 
         net = cut(net, union, nearer, number)
     for patch, origin in patches:
-        net = cut(net, union, lambda x, p=patch, o=origin: p.field(x - o), names.index(patch.region))
+
+        def worn(points: np.ndarray, patch: Patch = patch, origin: np.ndarray = origin) -> np.ndarray:
+            return patch.field(points - origin)
+
+        net = cut(net, union, worn, names.index(patch.region))
     return net, names

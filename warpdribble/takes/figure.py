@@ -93,7 +93,7 @@ def add_visuals(stage: Usd.Stage, parent: str, shapes: list[Shape], seams: bool,
 def coloured(shapes: list[Shape], seams: bool) -> list[tuple[meshes.Mesh, Vector]]:
     """A body's shapes as one mesh per colour; those that are fully transparent are left out."""
     shapes = [s for s in shapes if s.rgba[3] > 0.0]
-    parts = []
+    parts: list[tuple[meshes.Mesh, Vector]] = []
     for colour in dict.fromkeys(_colour(s) for s in shapes):
         mesh = meshes.merge([meshes.shape_mesh(s) for s in shapes if _colour(s) == colour])
         if seams and meshes.is_ball(mesh):
