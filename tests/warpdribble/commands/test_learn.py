@@ -179,7 +179,7 @@ def test_an_export_is_a_valid_take_of_a_player_that_stands(run, capsys, tmp_path
 
 def test_an_export_with_a_skin_and_a_fall(run, capsys, tmp_path):
     out = tmp_path / "take.usdc"
-    arguments = ["--seconds", "6", "--push", "3000", "--skin", "--no-html", "--out", str(out)]
+    arguments = ["--seconds", "6", "--push", "3000", "--no-html", "--out", str(out)]
     assert main(["export", str(run), *arguments]) == 0
     said = capsys.readouterr().out
     assert "first at" in said and "valid USD" in said
