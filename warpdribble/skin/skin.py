@@ -24,7 +24,7 @@ from .surface_net import line, neighbours, sew, surface_net
 
 CELL = 0.0125
 """[m] of the grid; fingers and the head have finer ones."""
-HAND_CELL = 0.0041
+HAND_CELL = 0.0045
 SPREAD = 28
 """Rounds of diffusion of the weights: a joint is smooth over about sqrt(2 x rounds) edges."""
 SOFT_SPREAD = 80
@@ -33,6 +33,10 @@ INFLUENCES = 4
 """Bodies that a point follows at most."""
 BENT, FINE = np.radians(30.0), 0.007
 """[rad] between the normals at an edge's ends from which it is halved, and [m] down to which."""
+
+
+WEIGHT_STEPS = 255
+"""A weight is a whole number of shares: numbers that recur are stored small, as bytes on the page."""
 
 
 @dataclass(frozen=True)
@@ -168,8 +172,9 @@ def _strongest(weights: np.ndarray, nbody: int) -> tuple[np.ndarray, np.ndarray]
     """Bodies and weights (points, INFLUENCES), the strongest first."""
     order = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
     kept = np.take_along_axis(weights, order, axis=1)
-    kept[kept < 0.005] = 0.0
-    return np.minimum(order, nbody - 1), kept / kept.sum(axis=1, keepdims=True)
+    kept = np.round(WEIGHT_STEPS * kept / kept.sum(axis=1, keepdims=True))
+    kept[:, 0] += WEIGHT_STEPS - kept.sum(axis=1)
+    return np.minimum(order, nbody - 1), kept / WEIGHT_STEPS
 
 
 def _refined(net: Net, union: Union, patches: list[tuple[Patch, np.ndarray]]) -> Net:

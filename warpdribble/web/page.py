@@ -203,13 +203,6 @@ def _skin(model: Model, blocks: Blocks) -> dict[str, Any]:
         used = np.unique(built.mesh.faces[chosen])
         part = _mesh(meshes.faces_of(built.mesh, chosen), built.colours[region], blocks)
         part["bones"] = blocks.add(built.bodies[used], "u2")
-        part["weights"] = blocks.add(_whole(built.weights[used]), "u1")
+        part["weights"] = blocks.add(np.round(skin.WEIGHT_STEPS * built.weights[used]), "u1")
         parts.append(part)
     return {"inverse": inverse.transpose(0, 2, 1).reshape(-1, 16).round(6).tolist(), "parts": parts}
-
-
-def _whole(weights: np.ndarray) -> np.ndarray:
-    """Weights as whole numbers that add up to 255; the first, largest one takes the rest."""
-    whole = np.round(255 * weights)
-    whole[:, 0] += 255 - whole.sum(axis=1)
-    return whole
