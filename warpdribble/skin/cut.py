@@ -100,7 +100,7 @@ def refine(net: Net, surface: Surface, wanted: Choice, rounds: int) -> Net:
             marked[also] = True
         chosen = pairs[marked]
         net = split(
-            net, chosen, np.full(len(chosen), 0.5), onto(surface, None, net.points[chosen].mean(axis=1))
+            net, chosen, np.full(len(chosen), 0.5), onto(surface, None, net.points[chosen].mean(axis=1), 2)
         )
     return net
 

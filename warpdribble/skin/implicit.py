@@ -29,6 +29,10 @@ class Union:
         self.bodies = np.array([body_of[lump.body] for lump in lumps])
         self.origins = frames[self.bodies, :3]
         self.turns = Rotation.from_quat(frames[self.bodies, 3:]).as_matrix()
+        ends = np.array([[lump.p, lump.q] for lump in lumps]) @ self.turns.transpose(0, 2, 1)
+        reach = [max(lump.r) * max(lump.scale) + 5.0 * lump.blend + 0.02 for lump in lumps]
+        self.low = self.origins + ends.min(axis=1) - np.array(reach)[:, None]
+        self.high = self.origins + ends.max(axis=1) + np.array(reach)[:, None]
 
     def local(self, i: int, points: np.ndarray) -> np.ndarray:
         return (points - self.origins[i]) @ self.turns[i]
@@ -42,18 +46,11 @@ class Union:
 
     def near(self, points: np.ndarray) -> list[np.ndarray]:
         """For each primitive, the indices of the points that it may matter to."""
-        found = []
-        for i, lump in enumerate(self.lumps):
-            ends = self.origins[i] + np.stack([lump.p, lump.q]) @ self.turns[i].T
-            reach = max(lump.r) * max(lump.scale) + 5.0 * lump.blend + 0.02
-            found.append(
-                np.flatnonzero(
-                    np.all(
-                        np.abs(points - ends.mean(axis=0)) < 0.5 * np.abs(ends[1] - ends[0]) + reach, axis=1
-                    )
-                )
-            )
-        return found
+        inside = np.ones((len(self.lumps), len(points)), bool)
+        for axis in range(3):
+            x = points[:, axis]
+            inside &= (x > self.low[:, axis, None]) & (x < self.high[:, axis, None])
+        return [np.flatnonzero(row) for row in inside]
 
     def slope(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """F (points,) and its gradient (points, 3) [1/m], by differences."""
