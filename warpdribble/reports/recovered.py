@@ -194,7 +194,8 @@ def _cells(values: dict[str, float]) -> dict[str, str]:
 
 
 def table(rows: list[Recovered]) -> str:
-    """As Markdown; medians of all, and of those that were found to their ends, last."""
+    """As Markdown, (*) at clips whose recorded ball moves as no ball can; last medians of all, of those that
+    were found to their ends, and of those without the mark."""
     lines = [
         "| clip | kept [%] | bounces found | time off [ms] | apex off [cm] | path off [cm] | fingers [cm] "
         "| search [s] | ended by | recorded e | fall [m/s²] |",
@@ -220,11 +221,10 @@ def table(rows: list[Recovered]) -> str:
         recorded = [f"{value:.2f}" if np.isfinite(value) else "-" for value in (r.e, r.fall)]
         name = r.clip if r.physical else f"{r.clip} (*)"
         lines.append(line(name, f"{r.found} of {r.recorded}", vars(r), r.ended, *recorded))
-    for name, some in (
-        ("all", rows),
-        ("found to the end", [r for r in rows if r.ended == WHOLE]),
-        ("as a ball can move", [r for r in rows if r.physical]),
-    ):
+    medians = {"all": rows, "found to the end": [r for r in rows if r.ended == WHOLE]}
+    if not all(r.physical for r in rows):
+        medians["as a ball can move"] = [r for r in rows if r.physical]
+    for name, some in medians.items():
         middle = {}
         for number in NUMBERS:
             values = [value for r in some if np.isfinite(value := getattr(r, number))]
