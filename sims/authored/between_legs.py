@@ -4,6 +4,8 @@ in front through the legs to the left hand behind, and back.
 The palms are outside the ball and swing it as a pendulum. A ball that palms only press down, as in the other
 dribbles, would fly as high as the chest in so long a time.
 
+The centre of mass stays between the feet, nearly at rest, and the pelvis moves against ball and trunk.
+
 Measured on BallPlay-M's 044 lleg_2, put on the player; lengths in cm, angles in degrees:
 
 | | lleg_2 | here |
@@ -14,7 +16,8 @@ Measured on BallPlay-M's 044 lleg_2, put on the player; lengths in cm, angles in
 | ball at its highest in the right hand, ahead of the pelvis, to the left, up | 44, -33, 68 | 54, -36, 75 |
 | in the left hand | -19, 49, 62 | -18, 48, 75 |
 | pelvis' and trunk's turn to the left, most with the ball in the left hand | 14, 24 | 12, 24 |
-| torso bent by | 80 | 72 |
+| torso bent by | 80 | 75 |
+| centre of mass before the line from ankle to ankle | 5.5 | 5.6 |
 | heel of the foot behind risen by | 0 to 24 | 6 to 22 |
 """
 
@@ -28,6 +31,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from ..ball.flight import GRAVITY, GRIP, Bounce
 from ..model import Model
 from ..reference.reference import Reference
+from .balance import balance
 from .dribble import fingers
 from .feet import place_foot, planted
 from .palm import place_palm
@@ -38,7 +42,7 @@ LEFT = 0.34
 POSTURE = Posture(
     pelvis=Turn(Wave(0.0, (12.0, LEFT)), Wave(18.0, (7.0, LEFT + 0.5), (2.0, 0.05)), Wave(-3.0, (2.0, LEFT))),
     torso=Turn(
-        Wave(8.0, (24.0, LEFT - 0.03)), Wave(72.0, (3.0, LEFT), (3.0, 0.05)), Wave(0.0, (8.0, LEFT + 0.47))
+        Wave(8.0, (24.0, LEFT - 0.03)), Wave(75.0, (3.0, LEFT), (3.0, 0.05)), Wave(0.0, (8.0, LEFT + 0.47))
     ),
     head=Turn(Wave(2.0, (14.0, LEFT)), Wave(48.0, (2.0, LEFT), (2.0, 0.05)), Wave(0.0, (3.0, LEFT + 0.5))),
     shoulders=Wave(1.0, twice=(3.0, 0.33)),
@@ -82,6 +86,10 @@ LEFT_HAND = Grasp(
 
 
 HEEL = Wave(14.0, (8.0, LEFT))
+PELVIS, OVER = (
+    Wave(0.72, (0.005, LEFT + 0.5), (0.03, 0.33)),
+    (Wave(0.115, (0.012, 0.07)), Wave(0.0, (0.010, 0.07))),
+)
 
 
 @dataclass(frozen=True)
@@ -98,12 +106,10 @@ class BetweenLegs:
     right: Grasp = RIGHT_HAND
     left: Grasp = LEFT_HAND
     posture: Posture = POSTURE
-    pelvis: tuple[Wave, Wave, Wave] = (
-        Wave(-0.03, (0.03, LEFT)),
-        Wave(0.00, (0.02, LEFT + 0.5)),
-        Wave(0.72, (0.005, LEFT + 0.5), (0.03, 0.33)),
-    )
-    """Ahead, to the left, up."""
+    pelvis: Wave = PELVIS
+    """How high it is."""
+    over: tuple[Wave, Wave] = OVER
+    """Where the centre of mass is, ahead and to the left."""
     feet: tuple[tuple[float, float, float], ...] = ((0.34, 0.25, 8.0), (-0.34, -0.27, 32.0))
     """Left and right ankle: ahead, to the left, turned out."""
     heel: Wave = HEEL
@@ -124,16 +130,23 @@ def between_legs(
 
     joint_q = np.tile(fingers(model, 1.0, "lr"), (steps + 1, 1))
     root = model.q_slice(model.root).start
-    joint_q[:, root : root + 3] = np.column_stack([wave.at(turns) for wave in style.pelvis])
+    over = np.column_stack([wave.at(turns) for wave in style.over])
+    joint_q[:, root : root + 3] = np.column_stack([over, style.pelvis.at(turns)])
     stand_up(model, joint_q, style.posture, turns)
     up = model.zero_pose[model.body("l_foot"), 2]
-    for side, (ahead, left, out), heel in zip("lr", style.feet, (Wave(0.0), style.heel)):
-        flat = np.tile([ahead, left, up], (steps + 1, 1))
-        place_foot(model, joint_q, side, *planted(model, side, flat, out, heel.at(turns)))
-    for side, grasp, begin in (("l", style.left, half), ("r", style.right, 0.0)):
-        when = begin + np.array([0.0, 0.5 * (half + flight), half + flight, 1.5 * half + 0.5 * flight])
-        normal, pointing = (_cyclic(when, keys, 2.0 * half)(times) for keys in (grasp.normal, grasp.pointing))
-        place_palm(model, joint_q, side, under[side], normal, pointing, grasp.elbow, radius)
+
+    def limbs(joint_q: np.ndarray) -> None:
+        for side, (ahead, left, out), heel in zip("lr", style.feet, (Wave(0.0), style.heel)):
+            flat = np.tile([ahead, left, up], (steps + 1, 1))
+            place_foot(model, joint_q, side, *planted(model, side, flat, out, heel.at(turns)))
+        for side, grasp, begin in (("l", style.left, half), ("r", style.right, 0.0)):
+            when = begin + np.array([0.0, 0.5 * (half + flight), half + flight, 1.5 * half + 0.5 * flight])
+            normal, pointing = (
+                _cyclic(when, keys, 2.0 * half)(times) for keys in (grasp.normal, grasp.pointing)
+            )
+            place_palm(model, joint_q, side, under[side], normal, pointing, grasp.elbow, radius)
+
+    balance(model, joint_q, over, limbs)
     joint_q[-1] = joint_q[0]
     own = times % half >= flight - 1e-9
     held = np.column_stack([own & (times < half), own & (times > half)])

@@ -35,12 +35,9 @@ from scipy.interpolate import CubicSpline
 
 from ..ball.flight import GRAVITY
 from ..model import Model, pose
+from .balance import balance
 from .breath import Swing, swing
 from .feet import foot_turn, place_foot, planted
-
-TRIES, GAIN = 6, 1.1
-"""A pelvis that is moved takes most of the player's mass along: after so many times the centre of mass is a
-micrometre off."""
 
 
 @dataclass(frozen=True)
@@ -108,13 +105,13 @@ def run(
     root = model.q_slice(model.root).start
     goal = centre_of_mass(gait, times)
     joint_q[:, root : root + 3] = goal
-    for _ in range(TRIES):
+
+    def limbs(joint_q: np.ndarray) -> None:
         arms(joint_q)
         for side, strike in (("l", 0.0), ("r", 0.5 * gait.period)):
             _leg(model, joint_q, gait, times, side, strike)
-        own, centres = pose.centres_of_mass(model, pose.forward(model, joint_q))
-        share = model.body_mass[own] / model.body_mass[own].sum()
-        joint_q[:, root : root + 3] += GAIN * (goal - np.einsum("b,fbk->fk", share, centres))
+
+    balance(model, joint_q, goal, limbs)
 
 
 def _leg(model: Model, joint_q: np.ndarray, gait: Gait, times: np.ndarray, side: str, strike: float) -> None:

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from warpdribble.clips import read_clip
 from warpdribble.sims import Model, authored_clip, retargeted
 from warpdribble.sims.model import gaps, pose
+from warpdribble.sims.model.slots import touch_points
 from warpdribble.sims.planar import heading
 from warpdribble.sims.signals import runs
 
@@ -42,6 +44,28 @@ def test_it_stands_with_the_left_foot_in_front_and_over_both(player, body_q, at)
     share = player.body_mass[own] / player.body_mass[own].sum()
     along = (np.einsum("b,fbk->fk", share, centres) - at("r_foot")) @ apart / (apart @ apart)
     assert along.min() > 0.3 and along.max() < 0.8
+
+
+def test_its_weight_is_on_its_feet_all_the_time(player, body_q):
+    """The point about which gravity and accelerations have no moment over the ground, bodies taken as points,
+    stays inside the hull of what touches the ground, as a hand lets go too."""
+    own, centres = pose.centres_of_mass(player, body_q[:-1])
+    mass = player.body_mass[own][None, :, None]
+    pull = np.roll(centres, -1, axis=0) - 2.0 * centres + np.roll(centres, 1, axis=0)
+    force = mass * (pull / STEP**2 + [0.0, 0.0, 9.81])
+    total, moment = force.sum(axis=1), np.cross(centres, force).sum(axis=1)
+    point = np.column_stack([-moment[:, 1], moment[:, 0]]) / total[:, 2:]
+    feet = [player.body(f"{side}_{part}") for side in "lr" for part in ("foot", "toes")]
+    soles = []
+    for shape in (shape for shape in player.shapes if shape.body in feet):
+        turn = Rotation.from_quat(body_q[:-1, shape.body, 3:])
+        soles += [
+            body_q[:-1, shape.body, :3] + turn.apply(place) - [0.0, 0.0, radius]
+            for place, radius in touch_points(shape)
+        ]
+    for at, under in zip(point, np.stack(soles, axis=1)):
+        sides = ConvexHull(under[under[:, 2] < 0.003, :2]).equations
+        assert (sides[:, :2] @ at + sides[:, 2]).max() < -0.004
 
 
 def test_the_front_foot_lies_flat_and_the_other_is_on_its_toes(player, body_q, at):
