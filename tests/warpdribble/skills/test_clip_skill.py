@@ -104,4 +104,4 @@ def test_a_skeleton_is_looked_for_as_clips_are(player, tmp_path, amc_clip, monke
     (tmp_path / "own.asf").unlink()
     with pytest.raises(ValueError, match=r"mine\.toml: asf: no file 'own\.asf' in ") as error:
         stage_skill(player, read_skill(tmp_path / "mine.toml"), tmp_path)
-    assert error.value.hint == "fetch"
+    assert error.value.hint == ""  # no set that can be fetched has it
