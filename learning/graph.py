@@ -178,7 +178,7 @@ def clip_graph(
     joint_q = reference.joint_q[held]
     targets = leading_targets(model, reference, feet, root_lead)[held]
     after = np.minimum(np.arange(count) + 1, count - 1)
-    graph = _graph(joint_q, speed, targets, reference.timestep, after)
+    graph = cut(joint_q, speed, targets, reference.timestep, after)
     return graph if ball is None else _played(graph, ball, held[1:], rows)
 
 
@@ -203,7 +203,7 @@ def cyclic_graph(
     middle = slice(count * STEPS, 2 * count * STEPS + 1)  # so that it has neighbours on both sides
     speed = central_velocity(model, several)[middle]
     targets = leading_targets(model, several, feet)[middle]
-    graph = _graph(
+    graph = cut(
         several.joint_q[middle], speed, targets, fitted.timestep, (np.arange(count) + 1) % count, name
     )
     graph = replace(graph, stretch=count * STEPS / rows)
@@ -222,7 +222,7 @@ def _played(graph: ControlGraph, ball: Ball, at: np.ndarray, rows: int) -> Contr
     return replace(graph, touch=touch, checkpoints=row[order], heights=np.asarray(ball.heights, float)[order])
 
 
-def _graph(
+def cut(
     joint_q: np.ndarray,
     speed: np.ndarray,
     targets: np.ndarray,

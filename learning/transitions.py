@@ -13,7 +13,7 @@ from ..sims.planar import over_ground, planar, relative, rotation
 from ..sims.reference.feedforward import leading_targets
 from ..sims.reference.reference import Reference, difference, integrate
 from ..sims.signals import smoothstep
-from .graph import STEPS, ControlGraph, Span, central_velocity, joined
+from .graph import STEPS, ControlGraph, central_velocity, cut, joined
 
 BLEND = 3
 """Fragments of a bridge."""
@@ -146,20 +146,9 @@ def bridge(
     own = slice(begins, begins + rows + 1)
     speed = central_velocity(model, whole)[own]
     targets = leading_targets(model, whole, model.roles.both("feet"))[own]
-    at = np.arange(count) * STEPS
     after = np.minimum(np.arange(count) + 1, count - 1)
     names = [graph.spans[0].name for graph in (a, b)]
-    made = ControlGraph(
-        targets=targets[1:],
-        motion=between[1:],
-        start_q=between[at],
-        start_qd=speed[at],
-        goal_q=between[at + STEPS],
-        goal_qd=speed[at + STEPS],
-        edges=np.stack([np.arange(count), after], axis=1),
-        timestep=a.timestep,
-        spans=(Span(f"{names[0]} > {names[1]}", 0, count),),
-    )
+    made = cut(between, speed, targets, a.timestep, after, f"{names[0]} > {names[1]}")
     if a.touch is None or b.touch is None:
         return made
     half = (rows + 1) // 2

@@ -86,7 +86,7 @@ class DribbleEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         _check("reach", reach)
         folder = Run.load(run)
         context = folder.context(ppo.STAGE, ppo.PpoConfig(state="full"), device, learns=False)
-        self._task = ppo.task(context, num_envs)
+        self._task = ppo.STAGE.task(context, num_envs)
         graph = context.graph
         self._starts, mean = _learned(folder, self._task.actions)
         self._given, self._phase = Given(mean, reach), phases(graph)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..runs.stage import Arrays, Report
+from ..arrays import Arrays, above, below
+from ..runs.stage import Report
 from ..starts import Starts
 from ..tasks.arms import Arms, OutOfTime
 from .hold import in_hand
@@ -170,8 +171,7 @@ class Cycles:
             "mean": self.mean,
             "times": self.times,
             "ahead": self.ahead,
-            **{f"begin.{name}": value for name, value in self.begin.arrays.items()},
-            **{f"found.{name}": value for name, value in found.items()},
+            **above(begin=self.begin.arrays, found=found),
         }
 
     def restore(self, state: Arrays) -> None:
@@ -180,10 +180,6 @@ class Cycles:
             raise ValueError(f"mean has the shape {state['mean'].shape}")
         self.mean, self.times, self.ahead = state["mean"], state["times"], state["ahead"]
         self.iteration, self.stuck = int(state["iteration"]), bool(state["stuck"])
-        self.begin = Moment.from_arrays(_under("begin.", state))
-        found = _under("found.", state)
+        self.begin = Moment.from_arrays(below("begin", state))
+        found = below("found", state)
         self.found = [Optimised.of(found)] if found else []
-
-
-def _under(first: str, arrays: Arrays) -> Arrays:
-    return {name.removeprefix(first): value for name, value in arrays.items() if name.startswith(first)}

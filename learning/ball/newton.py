@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...sims.model import Model
+from ..arrays import Arrays
 from ..graph import STEPS, ControlGraph
-from ..runs.stage import Arrays
 from ..tasks.arms import Arms, active_hands
 from ..tasks.fingers import FINGERS
 from . import paper

@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...sims.planar import turned
+from ..arrays import Arrays
 from ..choose import Ahead
 from ..rollout import Rollout
-from ..runs.stage import Arrays
 from ..starts import Starts
 from ..tasks.arms import Arms
 

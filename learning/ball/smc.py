@@ -16,11 +16,12 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from ..arrays import Arrays, above, below
 from ..choose import Ahead
 from ..policies.em import Moments, descendants, improve, select
 from ..policies.linear import Explore, LinearPolicy
 from ..rollout import Rollout
-from ..runs.stage import Arrays, Report
+from ..runs.stage import Report
 from ..starts import Starts, Streams
 from ..tasks.arms import Arms, OutOfTime
 from .optimised import Optimised
@@ -282,25 +283,27 @@ class Smc:
     @property
     def state(self) -> Arrays:
         """Arrays by name, from which `restore` goes on exactly as this object would."""
-        arrays = {f"policy.{x}": v for x, v in self.policy.arrays.items()}
-        arrays |= {f"moments.{x}": v for x, v in vars(self.moments).items()}
-        arrays |= {f"found.{x}": v for x, v in self.found.arrays.items()}
-        arrays |= {f"kept.{x}": v for x, v in self.kept.items()}
-        arrays |= {f"rows.{x}": np.array(v) for x, v in vars(self.rows).items()}
+        arrays = above(
+            policy=self.policy.arrays,
+            moments=vars(self.moments),
+            found=self.found.arrays,
+            kept=self.kept,
+            rows={name: np.array(values) for name, values in vars(self.rows).items()},
+        )
         return arrays | {name: np.array(getattr(self, name)) for name in COUNTS}
 
     def restore(self, state: Arrays) -> None:
         """Go on from what `state` was."""
-        self.policy = LinearPolicy(*(state[f"policy.{f.name}"] for f in fields(LinearPolicy)))
-        self.moments = Moments(*(state[f"moments.{f.name}"] for f in fields(Moments)))
-        self.found = Optimised(*(state[f"found.{f.name}"] for f in fields(Optimised)))
+        self.policy = LinearPolicy.of(below("policy", state))
+        self.moments = Moments(**below("moments", state))
+        self.found = Optimised(**below("found", state))
         if self.policy.M.shape[1:] != (self.task.actions, self.task.obs):
             raise ValueError(f"policy.M has the shape {self.policy.M.shape}")
-        self.rows = Rows(*(list(state[f"rows.{f.name}"]) for f in fields(Rows)))
+        self.rows = Rows(**{name: list(values) for name, values in below("rows", state).items()})
         self.rows.k = [int(k) for k in self.rows.k]
         for name in COUNTS:
             setattr(self, name, int(state[name]))
-        self.kept = {name[5:]: v for name, v in state.items() if name.startswith("kept.")}
+        self.kept = below("kept", state)
         self._recall()
 
 

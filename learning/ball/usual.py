@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..runs.stage import Arrays
+from ..arrays import Arrays
 from .cycles import Window
 from .newton import Newton
 from .smc import Smc

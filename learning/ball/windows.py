@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...sims.worlds import State
+from ..arrays import Arrays
 from ..choose import Ahead
 from ..graph import STEPS, ControlGraph
 from ..rollout import Rollout
-from ..runs.stage import Arrays
 from ..starts import Starts
 from ..tasks.arms import Arms
 from .optimised import Optimised

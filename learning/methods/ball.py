@@ -10,6 +10,7 @@ import numpy as np
 
 from ...sims.errors import InputError
 from ...sims.model import Model
+from ..arrays import Arrays
 from ..ball import newton
 from ..ball.hold import in_hand
 from ..ball.newton import Newton, NewtonConfig
@@ -21,7 +22,7 @@ from ..ball.windows import holding
 from ..evaluate.attempts import ROOT_DRIVE
 from ..graph import STEPS, ControlGraph
 from ..rollout import Controller
-from ..runs.stage import Arrays, Context, Learner, Stage
+from ..runs.stage import Context, Learner, Stage
 from ..starts import Starts
 from ..tasks.arms import USUAL, Arms, BallWeights
 from ..tasks.follow import OpenLoop
@@ -70,6 +71,11 @@ def arms(
     if graph.tracked:
         made.sim.set_root_drive(*ROOT_DRIVE)
     return made
+
+
+def felt(context: Context, worlds: int, threads: int | None = None) -> Arms:
+    """Worlds in which a policy of arms feels what its parameters say."""
+    return arms(context, worlds, threads, context.config.cost, context.config.state)
 
 
 def task(context: Context, worlds: int) -> Arms:

@@ -22,22 +22,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...sims.errors import InputError
+from ..arrays import Arrays, above, below
 from ..ball.averages import averaged
 from ..ball.optimised import Optimised
 from ..choose import RandomWalk
-from ..evaluate.trials import record_starts, run_trials
+from ..evaluate.trials import run_trials
 from ..policies.bounded import PHASES, BoundedPolicy, phase_table
 from ..policies.linear import LinearPolicy
 from ..policies.noisy import Noisy
 from ..policies.replay import Replay
 from ..rollout import Controller, Fragment, Rollout
-from ..runs.stage import Arrays, Context, Report, Stage
+from ..runs.stage import Context, Report, Stage, known
 from ..starts import Starts, Streams
-from ..tasks.arms import STATES, Arms, BallWeights
+from ..tasks.arms import STATES, BallWeights
 from . import samcon
 from .ball import STAGE as BALL
-from .ball import arms
+from .ball import felt
+from .kept import Kept, passed
 from .linear import begun
 
 
@@ -117,8 +118,6 @@ class DdpgConfig:
 
 
 BEGINNINGS = ("linear", "nothing")
-SPARSE, SETTLED, AHEAD = 3, 20, 40
-"""[fragments] as in `ppo`"""
 REPLAY = "replay.npy"
 
 
@@ -160,13 +159,13 @@ class Ddpg:
         c: DdpgConfig = context.config
         self.config, self.seed = c, context.seed
         found = Optimised.of(context.needs[BALL.name])
-        self.task, self.trial_task = task(context, c.worlds), task(context, c.trials)
-        self.ball, touch = averaged(task(context, 1), found)
+        self.task, self.trial_task = felt(context, c.worlds), felt(context, c.trials)
+        self.ball, touch = averaged(felt(context, 1), found)
         """(fragments, 3) [m] where the ball is on average when each fragment ends, p~ of Eq. 17"""
         self.radius = float(self.task.model.ball_radius)
         policy, self.found = begun(self.task, found, c.drop, c.first_ridge, c.noise)
         self.linear: LinearPolicy | None = policy if c.begin == "linear" else None
-        self.task = task(replace(context, graph=replace(context.graph, touch=touch)), c.worlds)
+        self.task = felt(replace(context, graph=replace(context.graph, touch=touch)), c.worlds)
         self.task.active = self.trial_task.active
         from ..policies.actor_q import ActorQ  # torch, which only learning needs
 
@@ -178,7 +177,7 @@ class Ddpg:
         own = {"active": self.task.active.astype(np.float32), "phase": phase}
         own |= {"bound": np.array(c.bound), "slope": np.array(c.slope)}
         self.policy = BoundedPolicy(mean=np.zeros(obs), scale=np.ones(obs), **own, **self.nets.weights())
-        self.best, self.best_score, self.best_starts = self.policy, -np.inf, self.found
+        self.best = Kept(self.policy, self.found)
         path = None if context.folder is None else context.folder / REPLAY
         self.replay = Replay(path, c.worlds, obs, actions, c.memory, 2 * c.steps)
         self.iteration, self._enough = 0, False
@@ -245,7 +244,7 @@ class Ddpg:
             reward=reward / c.steps,
             q=self.nets.q,
             critic_rate=self.nets.rate,
-            score=float(self.best_score),
+            score=self.best.score,
             survived=survived,
             samples_per_second=c.steps * c.worlds / seconds,
             learning=spent / seconds,
@@ -307,36 +306,21 @@ class Ddpg:
         survived = float(trials.survived.mean())
         self._enough = long and survived == 1.0
         score = (10.0 if long else 1.0) * float(trials.lived.mean())
-        if score > self.best_score:
-            self.best, self.best_score = self.policy, score
-            self.best_starts = record_starts(
-                self.trial_task,
-                self.policy,
-                self.found,
-                self.seed,
-                every=SPARSE,
-                settled=SETTLED,
-                ahead=AHEAD,
-            )
+        if score > self.best.score:
+            self.best = Kept(self.policy, passed(self.trial_task, self.policy, self.found, self.seed), score)
         return survived
 
     @property
     def result(self) -> Arrays | None:
-        """The best policy and the states to start it from, by name; None before the first check."""
-        if not np.isfinite(self.best_score):
-            return None
-        return self.best.arrays | {f"states.{name}": v for name, v in vars(self.best_starts).items()}
+        return self.best.result
 
     @property
     def state(self) -> Arrays:
         """Arrays by name, from which `restore` goes on exactly as this object would."""
-        arrays = {f"nets.{name}": part for name, part in self.nets.state.items()}
-        arrays |= {f"best.{name}": part for name, part in self.best.arrays.items()}
-        arrays |= {f"best_starts.{part}": v for part, v in vars(self.best_starts).items()}
-        arrays |= {f"worlds.{name}": part for name, part in self.task.snapshot().items()}
-        numbers = {name: getattr(self, name) for name in ("iteration", "best_score", "_enough")}
-        arrays |= {name: np.array(number) for name, number in numbers.items()}
+        arrays = self.best.state | above(nets=self.nets.state, worlds=self.task.snapshot())
         own = {
+            "iteration": self.iteration,
+            "enough": self._enough,
             "rows": self.replay.rows,
             "k": self.rollout.k,
             "mean": self.policy.mean,
@@ -346,18 +330,12 @@ class Ddpg:
 
     def restore(self, state: Arrays) -> None:
         """Go on from what `state` was. Raises ValueError for one of other networks."""
-
-        def of(kind: str) -> Arrays:
-            return {name[len(kind) + 1 :]: v for name, v in state.items() if name.startswith(f"{kind}.")}
-
-        self.nets.restore(of("nets"))
-        self.best = BoundedPolicy.of(of("best"))
-        self.best_starts = Starts(**of("best_starts"))
-        self.task.recall(of("worlds"))
+        self.nets.restore(below("nets", state))
+        self.best.restore(state, BoundedPolicy.of)
+        self.task.recall(below("worlds", state))
         self.replay.rows, self.rollout.k = int(state["rows"]), np.array(state["k"])
         self.policy = replace(self.policy, mean=state["mean"], scale=state["scale"], **self.nets.weights())
-        self.iteration, self._enough = int(state["iteration"]), bool(state["_enough"])
-        self.best_score = float(state["best_score"])
+        self.iteration, self._enough = int(state["iteration"]), bool(state["enough"])
 
 
 # ------------------------------------------------------------------------------------------------- stage
@@ -365,17 +343,8 @@ class Ddpg:
 
 def make(context: Context) -> Ddpg:
     """The learner of a graph."""
-    c: DdpgConfig = context.config
-    for what, known in (("state", STATES), ("begin", BEGINNINGS), ("phase", PHASES)):
-        if (name := getattr(c, what)) not in known:
-            raise InputError(f"there is no {what} '{name}'; there are {', '.join(known)}")
+    known(context.config, state=STATES, begin=BEGINNINGS, phase=PHASES)
     return Ddpg(context)
-
-
-def task(context: Context, worlds: int) -> Arms:
-    """Worlds in which it feels what it learned with."""
-    c: DdpgConfig = context.config
-    return arms(context, worlds, None, c.cost, c.state)
 
 
 def learned(context: Context, arrays: Arrays) -> Controller:
@@ -389,7 +358,7 @@ STAGE = Stage(
     config=DdpgConfig,
     make=make,
     controller=learned,
-    task=task,
+    task=felt,
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),

@@ -14,15 +14,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Arrays
 from ..ball.optimised import Optimised, observed, states_of
 from ..policies.linear import LinearPolicy
-from ..runs.stage import Arrays, Context, Stage
+from ..runs.stage import Context, Stage, known
 from ..starts import Starts
 from ..tasks.arms import STATES, Arms, BallWeights
 from ..tasks.disturbance import CALM, Disturbance
 from . import samcon
 from .ball import STAGE as BALL
-from .ball import arms
+from .ball import felt
+from .kept import Kept
 from .samcon import Samcon, SamconConfig, shared
 
 
@@ -98,8 +100,8 @@ class Linear(Samcon):
         super().__init__(tasks, trial_tasks, config, seed)
         self.found, task, c = found, tasks[0], config
         self.policy, states = begun(task, found, c.drop, c.first_ridge, c.sigma)
-        self.mean, self.best = self.policy.copy(), self.policy.copy()
-        self.starts = self.best_starts = states
+        self.mean, self.starts = self.policy.copy(), states
+        self.best = Kept(self.policy.copy(), states)
 
     def iterate(self) -> samcon.Progress:
         """The first: try what the regression gave. Later ones: see `Samcon`."""
@@ -111,22 +113,15 @@ class Linear(Samcon):
 def make(context: Context) -> Linear:
     """The learner of a graph, in worlds shared out among the workers."""
     c: LinearConfig = context.config
-    if c.state not in STATES:
-        raise ValueError(f"there is no state '{c.state}'; there are {', '.join(STATES)}")
+    known(c, state=STATES)
     found = Optimised.of(context.needs[BALL.name])
-    tasks, trial_tasks = shared(context, lambda worlds, threads: task(context, worlds, threads))
+    tasks, trial_tasks = shared(context, lambda worlds, threads: felt(context, worlds, threads))
     return Linear(tasks, trial_tasks, c, found, context.seed)
-
-
-def task(context: Context, worlds: int, threads: int | None = None) -> Arms:
-    """Worlds in which it feels what it learned with."""
-    c: LinearConfig = context.config
-    return arms(context, worlds, threads, c.cost, c.state)
 
 
 def learned(context: Context, arrays: Arrays) -> LinearPolicy:
     """The policy in a result."""
-    return LinearPolicy(*(arrays[name] for name in ("M", "a_hat", "sigma")))
+    return LinearPolicy.of(arrays)
 
 
 STAGE = Stage(
@@ -135,7 +130,7 @@ STAGE = Stage(
     config=LinearConfig,
     make=make,
     controller=learned,
-    task=task,
+    task=felt,
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),

@@ -19,21 +19,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...sims.errors import InputError
+from ..arrays import Arrays, above, below
 from ..ball.optimised import Optimised
 from ..choose import RandomWalk
-from ..evaluate.trials import about_trials, record_starts, run_trials
+from ..evaluate.trials import about_trials, run_trials
 from ..policies.batch import Batch, advantages
 from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
-from ..runs.stage import Arrays, Context, Report, Stage
+from ..runs.stage import Context, Report, Stage, known
 from ..starts import Starts, Streams
 from ..tasks.arms import STATES, Arms, BallWeights, misplaced
 from ..tasks.balls import Balls
 from ..tasks.disturbance import Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
-from .ball import arms
+from .ball import felt
+from .kept import Kept, passed
 from .linear import begun
 
 
@@ -103,9 +104,6 @@ POOL = 2048
 """States of the policy's own way that are kept to start from."""
 KEPT = 64
 """of them from a batch"""
-SPARSE, SETTLED, AHEAD = 3, 20, 40
-"""[fragments] States to start from are every third that the policy comes through, a second after a start, and
-lives on from for two."""
 
 
 @dataclass
@@ -171,7 +169,7 @@ class Ppo:
         self.policy = NetworkPolicy(
             base.M, base.a_hat, np.zeros(task.obs), np.ones(task.obs), np.array(c.sigma), self.nets.network()
         )
-        self.best, self.best_score, self.best_starts = self.policy, -np.inf, self.found
+        self.best = Kept(self.policy, self.found)
         self.hardness = EASY
         """share of the disturbances of starts, which grows as they are stood"""
         self.iteration, self._enough = 0, False
@@ -240,7 +238,7 @@ class Ppo:
             hardness=self.hardness,
             sigma=self.config.sigma * float(np.exp(batch.log_sigma).mean()),
             rate=self.nets.rate,
-            score=float(self.best_score),
+            score=self.best.score,
             survived=survived,
             samples_per_second=batch.reward.size / seconds,
             learning=spent / seconds,
@@ -310,61 +308,45 @@ class Ppo:
             self.trial_task, self.policy, start, cycles, self.seed, c.speed_noise, c.disturbance
         )
         score = float(trials.lived.mean()) - 0.01 * trials.cost if trials.lived.any() else -1.0
-        if score > self.best_score:
-            self.best, self.best_score = self.policy, score
-            self.best_starts = record_starts(
-                self.trial_task, self.policy, start, self.seed, every=SPARSE, settled=SETTLED, ahead=AHEAD
-            )
+        if score > self.best.score:
+            self.best = Kept(self.policy, passed(self.trial_task, self.policy, start, self.seed), score)
         survived = float(trials.survived.mean())
         self._enough = survived >= c.enough and self.hardness == 1.0
         return survived
 
     @property
     def result(self) -> Arrays | None:
-        """The best policy and the states to start it from, by name; None before the first check."""
-        if not np.isfinite(self.best_score):
-            return None
-        return self.best.arrays | {f"states.{name}": v for name, v in vars(self.best_starts).items()}
+        return self.best.result
 
     @property
     def state(self) -> Arrays:
         """Arrays by name, from which `restore` goes on exactly as this object would."""
-        arrays = {f"nets.{name}": part for name, part in self.nets.state.items()}
-        arrays |= {f"best.{name}": part for name, part in self.best.arrays.items()}
-        for name, starts in (("own", self.own), ("best_starts", self.best_starts)):
-            arrays |= {f"{name}.{part}": v for part, v in vars(starts).items()}
-        arrays |= {f"worlds.{name}": part for name, part in self.task.snapshot().items()}
-        arrays |= {f"disturber.{name}": part for name, part in self.disturber.state.items()}
-        if self.batch is not None:
-            arrays |= {f"batch.{name}": part for name, part in vars(self.batch).items()}
-        numbers = {
-            "iteration": self.iteration,
-            "enough": self._enough,
-            "best_score": self.best_score,
-            "hardness": self.hardness,
-        }
-        arrays |= {name: np.array(number) for name, number in numbers.items()}
+        batch = {} if self.batch is None else vars(self.batch)
+        arrays = self.best.state | above(
+            nets=self.nets.state,
+            own=vars(self.own),
+            worlds=self.task.snapshot(),
+            disturber=self.disturber.state,
+            batch=batch,
+        )
+        numbers = {"iteration": self.iteration, "enough": self._enough, "hardness": self.hardness}
         own = {"age": self.age, "k": self.rollout.k, "mean": self.policy.mean, "scale": self.policy.scale}
-        return arrays | {name: np.array(part) for name, part in own.items()}
+        return arrays | {name: np.array(part) for name, part in (numbers | own).items()}
 
     def restore(self, state: Arrays) -> None:
         """Go on from what `state` was. Raises ValueError for one of another network."""
-
-        def of(kind: str) -> Arrays:
-            return {name[len(kind) + 1 :]: v for name, v in state.items() if name.startswith(f"{kind}.")}
-
-        self.nets.restore(of("nets"))
-        self.best = NetworkPolicy.of(of("best"))
-        self.own, self.best_starts = Starts(**of("own")), Starts(**of("best_starts"))
-        self.task.recall(of("worlds"))
-        self.disturber.restore(of("disturber"))
-        self.batch = Batch(**batch) if (batch := of("batch")) else None
+        self.nets.restore(below("nets", state))
+        self.best.restore(state, NetworkPolicy.of)
+        self.own = Starts(**below("own", state))
+        self.task.recall(below("worlds", state))
+        self.disturber.restore(below("disturber", state))
+        self.batch = Batch(**batch) if (batch := below("batch", state)) else None
         self.age, self.rollout.k = np.array(state["age"]), np.array(state["k"])
         self.policy = replace(
             self.policy, mean=state["mean"], scale=state["scale"], network=self.nets.network()
         )
         self.iteration, self._enough = int(state["iteration"]), bool(state["enough"])
-        self.best_score, self.hardness = float(state["best_score"]), float(state["hardness"])
+        self.hardness = float(state["hardness"])
 
 
 # ------------------------------------------------------------------------------------------------- stage
@@ -373,18 +355,9 @@ class Ppo:
 def make(context: Context) -> Ppo:
     """The learner of a graph."""
     c: PpoConfig = context.config
-    if c.state not in STATES:
-        raise InputError(f"there is no state '{c.state}'; there are {', '.join(STATES)}")
-    if c.base not in BASES:
-        raise InputError(f"there is no base '{c.base}'; there are {', '.join(BASES)}")
+    known(c, state=STATES, base=BASES)
     found = Optimised.of(context.needs[BALL.name])
-    return Ppo(task(context, c.worlds), task(context, c.trials), c, found, context.seed)
-
-
-def task(context: Context, worlds: int) -> Arms:
-    """Worlds in which it feels what it learned with."""
-    c: PpoConfig = context.config
-    return arms(context, worlds, None, c.cost, c.state)
+    return Ppo(felt(context, c.worlds), felt(context, c.trials), c, found, context.seed)
 
 
 def learned(context: Context, arrays: Arrays) -> Controller:
@@ -403,7 +376,7 @@ STAGE = Stage(
     config=PpoConfig,
     make=make,
     controller=learned,
-    task=task,
+    task=felt,
     ball=True,
     needs=(samcon.STAGE.name, BALL.name),
     uses=(samcon.STAGE.name,),

@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 
 from ...sims.errors import InputError
 from ...sims.worlds.cores import usable_cores
+from ..arrays import Arrays, above, below
 from ..choose import RandomWalk
 from ..evaluate.trials import Trials, about_trials, record_starts, run_trials
 from ..policies.em import Moments, added, descendants, improve, select
@@ -32,6 +33,7 @@ from ..starts import Starts, Streams, reference_starts
 from ..tasks.disturbance import Disturbance, Disturber
 from ..tasks.locomotion import FELT, STEERED, WEIGHTS, CostWeights, Locomotion, legs_graph, locomotion_model
 from ..workers import Workers, shares
+from .kept import Kept
 
 T = TypeVar("T")
 RECORD_EVERY = 5
@@ -208,11 +210,9 @@ class Samcon:
         graph = self.tasks[0].graph
         self.policy = LinearPolicy.zero(graph.count, self.tasks[0].actions, self.tasks[0].obs, config.sigma)
         self.mean = self.policy.copy()
-        self.best = self.policy.copy()
-        self.best_score = -np.inf
         self.iteration = 0
         self.starts = reference_starts(graph)
-        self.best_starts = self.starts
+        self.best = Kept(self.policy.copy(), self.starts)
 
     @property
     def done(self) -> bool:
@@ -254,7 +254,7 @@ class Samcon:
             cost=sum(island.cost for island in islands) / stood if stood else np.nan,
             falls=sum(island.falls for island in islands),
             sigma=float(self.policy.sigma.mean()),
-            score=float(self.best_score),
+            score=self.best.score,
             survived=survived,
             samples_per_second=float(samples),
             outside=float(1.0 - simulating / len(self.tasks)),
@@ -288,42 +288,34 @@ class Samcon:
                 self.starts,
                 self.config,
                 self.seed,
-                self.best_score,
+                self.best.score,
             )
             for i, policy in enumerate(tried)
         ]
         for policy, (trials, score, starts) in zip(tried, self.workers.each(_try, jobs)):
             survived = float(trials.survived.mean())
-            if starts is not None and score > self.best_score:
-                self.best, self.best_score, self.best_starts = policy.copy(), score, starts
+            if starts is not None and score > self.best.score:
+                self.best = Kept(policy.copy(), starts, score)
         return survived
 
     @property
-    def result(self) -> dict[str, np.ndarray] | None:
-        """The best policy and the states to start it from, by name; None before the first check."""
-        if not np.isfinite(self.best_score):
-            return None
-        return self.best.arrays | {f"states.{name}": v for name, v in vars(self.best_starts).items()}
+    def result(self) -> Arrays | None:
+        return self.best.result
 
     @property
-    def state(self) -> dict[str, np.ndarray]:
+    def state(self) -> Arrays:
         """Arrays by name, from which `restore` goes on exactly as this object would."""
-        policies = {"policy": self.policy, "mean": self.mean, "best": self.best}
-        arrays = {f"{name}.{x}": v for name, p in policies.items() for x, v in p.arrays.items()}
-        starts = {"starts": self.starts, "best_starts": self.best_starts}
-        arrays |= {f"{name}.{x}": v for name, s in starts.items() for x, v in vars(s).items()}
-        return arrays | {"iteration": np.array(self.iteration), "best_score": np.array(self.best_score)}
+        own = above(policy=self.policy.arrays, mean=self.mean.arrays, starts=vars(self.starts))
+        return self.best.state | own | {"iteration": np.array(self.iteration)}
 
-    def restore(self, state: dict[str, np.ndarray]) -> None:
+    def restore(self, state: Arrays) -> None:
         """Go on from what `state` was."""
-        for name in ("policy", "mean", "best"):
-            read = LinearPolicy(*(state[f"{name}.{f.name}"] for f in fields(LinearPolicy)))
-            if read.M.shape != self.policy.M.shape:
-                raise ValueError(f"{name}.M has the shape {read.M.shape}")
-            setattr(self, name, read)
-        for name in ("starts", "best_starts"):
-            setattr(self, name, Starts(*(state[f"{name}.{f.name}"] for f in fields(Starts))))
-        self.iteration, self.best_score = int(state["iteration"]), float(state["best_score"])
+        shape = state["policy.M"].shape
+        if shape != self.policy.M.shape:
+            raise ValueError(f"policy.M has the shape {shape}")
+        self.policy, self.mean = (LinearPolicy.of(below(name, state)) for name in ("policy", "mean"))
+        self.best.restore(state, LinearPolicy.of)
+        self.starts, self.iteration = Starts(**below("starts", state)), int(state["iteration"])
 
 
 def _try(
@@ -372,7 +364,7 @@ def locomotion_task(context: Context, worlds: int) -> Locomotion:
 
 def learned(context: Context, arrays: dict[str, np.ndarray]) -> LinearPolicy:
     """The policy in a result. Raises InputError for one of a task that steers or feels something else."""
-    policy = LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy)))
+    policy = LinearPolicy.of(arrays)
     if policy.M.shape[1:] != (STEERED, FELT):
         reason = (
             f"an older version learned it: it feels {policy.M.shape[2]} numbers, not {FELT}; learn it anew"

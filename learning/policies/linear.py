@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,6 +43,11 @@ class LinearPolicy:
     def arrays(self) -> dict[str, np.ndarray]:
         """By name, for a file."""
         return dict(vars(self))
+
+    @staticmethod
+    def of(arrays: Mapping[str, np.ndarray]) -> LinearPolicy:
+        """From `arrays`, whatever else is among them. Raises KeyError for what lacks any."""
+        return LinearPolicy(*(arrays[f.name] for f in fields(LinearPolicy)))
 
     def moved(self, other: LinearPolicy, share: float) -> LinearPolicy:
         """This policy, moved a share of the way to another."""

@@ -28,13 +28,14 @@ from ... import __version__
 from ...assets import path as asset
 from ...sims.errors import InputError
 from ...sims.files import PART, check_folder, sweep, whole
+from ..arrays import Arrays
 from ..graph import ControlGraph
 from ..rollout import Controller
 from ..starts import Starts
 from ..tasks.locomotion import Locomotion
 from .files import LOCK, held, read_arrays, said_if_damaged, write_arrays, write_json
 from .log import Log
-from .stage import Arrays, Context, Learner, Stage
+from .stage import Context, Learner, Stage
 
 RUN, SKILL, GRAPH = "run.json", "skill.toml", "graph.npz"
 CONFIG, CHECKPOINT, RESULT = "config.json", "checkpoint.npz", "policy.npz"

@@ -6,19 +6,17 @@ commands know the rest from here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
+from ...sims.errors import InputError
+from ..arrays import Arrays
 from ..graph import ControlGraph
 from ..rollout import Controller
 from ..tasks.locomotion import Locomotion
-
-Arrays = dict[str, np.ndarray]
 
 
 @dataclass
@@ -73,6 +71,13 @@ class Context:
     """the stage's, for what is too large for a checkpoint, as a replay buffer (`files.mapped`)"""
     needs: Mapping[str, Arrays] = field(default_factory=dict)
     """results of the stages that it needs, by name"""
+
+
+def known(config: Any, **names: Collection[str]) -> None:
+    """Raises InputError where a parameter is not one of the names that there are."""
+    for what, there in names.items():
+        if (name := getattr(config, what)) not in there:
+            raise InputError(f"there is no {what} '{name}'; there are {', '.join(there)}")
 
 
 @dataclass(frozen=True)

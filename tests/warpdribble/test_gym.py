@@ -59,7 +59,7 @@ def equal(one, two):
 
 
 def test_spaces(env):
-    task = ppo.task(Run.load(NAME).context(ppo.STAGE, ppo.PpoConfig(), learns=False), 1)
+    task = ppo.STAGE.task(Run.load(NAME).context(ppo.STAGE, ppo.PpoConfig(), learns=False), 1)
     assert env.single_observation_space.shape == (task.obs + 2,)
     assert env.single_action_space == gymnasium.spaces.Box(-1.0, 1.0, (20,), np.float32)
     assert env.action_space.shape == (6, 20) and env.num_envs == 6
@@ -95,7 +95,7 @@ def test_it_is_the_closed_loop(env):
     seen = gone(env, given, seed=5)
     random, _ = gymnasium.utils.seeding.np_random(5)
     run = Run.load(NAME)
-    task = ppo.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), env.num_envs)
+    task = ppo.STAGE.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), env.num_envs)
     streams = Streams([random], env.num_envs)
     start = run.learned(STAGES, "policy").starts.draw(streams, 0.05)
     ball = task.model.q_slice("ball").start
@@ -162,7 +162,7 @@ def test_a_finished_world_begins_anew_in_the_next_step(wild):
     assert np.all(seen["reward"][going & ~over] > 0.0)
     run = Run.load(NAME)
     starts = run.learned(STAGES, "policy").starts
-    task = ppo.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), 16)
+    task = ppo.STAGE.task(run.context(ppo.STAGE, ppo.PpoConfig(), learns=False), 16)
     known = np.concatenate([observed(task, starts), phases(task.graph)[starts.k]], axis=1)
     began = seen["obs"][rows + 2, worlds]
     apart = np.abs(began[:, None] - known[None]).max(axis=2).min(axis=1)

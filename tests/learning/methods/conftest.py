@@ -1,5 +1,7 @@
 """What learners of arm policies start from, without a search for it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,3 +38,19 @@ def dribbled():
     found = Optimised(**{name: np.array(values) for name, values in rows.items()})
     needs = {"locomotion": read_result(run.folder / "locomotion"), "ball": found.result}
     return Context(skill_graph(read_skill(SKILL))[0], None, seed=3, needs=needs)
+
+
+@pytest.fixture(scope="module")
+def context(request, dribbled):
+    """With the parameters SMALL of the test's module."""
+    return replace(dribbled, config=request.module.SMALL)
+
+
+@pytest.fixture(scope="module")
+def learned(request, context):
+    """A learner at its end, made by the module's MAKE, and what it said."""
+    one = request.module.MAKE(context)
+    reports = []
+    while not one.done:
+        reports.append(one.iterate())
+    return one, reports

@@ -1,6 +1,5 @@
 """DDPG: its reward and its replay buffer against the definitions, and a short run of it."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from tests.learning.methods.learners import delayed, same  # noqa: E402
 from warpdribble.learning import STAGES  # noqa: E402
 from warpdribble.learning.methods import ddpg  # noqa: E402
 from warpdribble.learning.methods.ddpg import DdpgConfig, Reward  # noqa: E402
@@ -23,20 +23,7 @@ SMALL = DdpgConfig(
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def context(dribbled):
-    return replace(dribbled, config=SMALL)
-
-
-@pytest.fixture(scope="module")
-def learned(context):
-    """A learner at its end, and what it said."""
-    one = ddpg.make(context)
-    reports = []
-    while not one.done:
-        reports.append(one.iterate())
-    return one, reports
-
+MAKE = ddpg.make
 
 # ------------------------------------------------------------------------------------------- the buffer
 
@@ -148,7 +135,7 @@ def test_idle_arms_do_nothing(learned):
 def test_the_fingers_count_only_where_they_have_the_ball(learned, context):
     """H of the task is a part of the reference's; what acts, and checkpoints, are the reference's."""
     one, _ = learned
-    usual = ddpg.task(context, 8)
+    usual = ddpg.STAGE.task(context, 8)
     assert (one.task.held <= usual.held).all() and one.task.held.sum() > 0
     np.testing.assert_array_equal(one.task.active, usual.active)
     np.testing.assert_array_equal(one.task.marked, usual.marked)
@@ -160,11 +147,6 @@ def test_what_was_learned_is_a_policy_that_acts(learned, context):
     assert isinstance(controller, BoundedPolicy)
     task = ddpg.STAGE.task(context, 8)
     assert controller.act(np.zeros((8, task.obs)), np.arange(8)).shape == (8, 20)
-
-
-def same(one, other):
-    for name, value in one.state.items():
-        np.testing.assert_array_equal(other.state[name], value, err_msg=name)
 
 
 def test_a_state_goes_on_to_the_bit(learned, context, tmp_path):
@@ -183,14 +165,7 @@ def test_a_state_goes_on_to_the_bit(learned, context, tmp_path):
 
 def test_a_slow_learner_simulates_the_same(learned, context, monkeypatch):
     """What is simulated beside learning does not see what is learned meanwhile, whichever is slower."""
-    one = ddpg.make(context)
-    simulate = one._simulate
-
-    def late(*args):
-        time.sleep(0.02)
-        return simulate(*args)
-
-    monkeypatch.setattr(one, "_simulate", late)
+    one = delayed(ddpg.make(context), monkeypatch, 0.02)
     while not one.done:
         one.iterate()
     same(learned[0], one)

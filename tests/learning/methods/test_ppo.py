@@ -1,6 +1,5 @@
 """PPO: its advantages and its objective against the definitions, and a short run of it."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from tests.learning.methods.learners import delayed, same  # noqa: E402
 from warpdribble.learning import STAGES, run_trials  # noqa: E402
 from warpdribble.learning.ball.optimised import Optimised  # noqa: E402
 from warpdribble.learning.methods import ppo  # noqa: E402
@@ -24,19 +24,7 @@ SMALL = PpoConfig(
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def context(dribbled):
-    return replace(dribbled, config=SMALL)
-
-
-@pytest.fixture(scope="module")
-def learned(context):
-    """A learner at its end, and what it said."""
-    one = ppo.make(context)
-    reports = []
-    while not one.done:
-        reports.append(one.iterate())
-    return one, reports
+MAKE = ppo.make
 
 
 def test_advantages_are_the_sums_that_define_them():
@@ -137,24 +125,15 @@ def test_a_state_goes_on_to_the_bit(learned, context):
     other.restore({name: np.array(value) for name, value in one.state.items()})
     while not other.done:
         other.iterate()
-    for name, value in learned[0].state.items():
-        np.testing.assert_array_equal(other.state[name], value, err_msg=name)
+    same(learned[0], other)
 
 
-def test_a_slow_learner_simulates_the_same(context, monkeypatch):
+def test_a_slow_learner_simulates_the_same(learned, context, monkeypatch):
     """What is simulated beside learning does not see what is learned meanwhile, whichever is slower."""
-    one, other = ppo.make(context), ppo.make(context)
-    simulate = other._simulate
-
-    def late(*args):
-        time.sleep(0.3)
-        return simulate(*args)
-
-    monkeypatch.setattr(other, "_simulate", late)
-    for _ in range(4):
-        one.iterate(), other.iterate()
-    for name, value in one.state.items():
-        np.testing.assert_array_equal(other.state[name], value, err_msg=name)
+    one = delayed(ppo.make(context), monkeypatch, 0.3)
+    while not one.done:
+        one.iterate()
+    same(learned[0], one)
 
 
 def test_a_state_of_another_network_is_refused(learned, context):

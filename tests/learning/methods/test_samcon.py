@@ -8,6 +8,7 @@ import pytest
 from tests.learning.methods.small import ISLANDS, SMALL
 from warpdribble.learning.evaluate.trials import run_trials
 from warpdribble.learning.methods import samcon
+from warpdribble.learning.methods.kept import Kept
 from warpdribble.learning.methods.samcon import (
     STAGE,
     Progress,
@@ -50,7 +51,7 @@ def test_resumed_it_goes_on_bit_for_bit(task, tmp_path):
     for _ in range(2):
         one.iterate()
     reference = reference_starts(one.tasks[0].graph)
-    assert np.isfinite(one.best_score) and not np.array_equal(one.starts.k, reference.k)
+    assert np.isfinite(one.best.score) and not np.array_equal(one.starts.k, reference.k)
     np.savez(tmp_path / "state.npz", **one.state)
     two = learner(task, seed=1)
     with np.load(tmp_path / "state.npz") as file:
@@ -87,7 +88,7 @@ def test_workers_change_nothing(graph, islands, particles):
             np.testing.assert_equal(report, reports[0])
     for one in learners[1:]:
         assert_same_state(one, learners[0])
-    assert np.isfinite(learners[0].best_score)
+    assert np.isfinite(learners[0].best.score)
 
 
 def test_resumed_with_another_number_of_workers_it_goes_on_bit_for_bit(graph):
@@ -117,7 +118,7 @@ def test_what_an_iteration_says(task):
     assert [report.iteration for report in reports] == [1, 2]
     assert [report.fresh for report in reports] == [False, True]
     assert np.isnan(reports[0].survived) and reports[0].score == -np.inf
-    assert 0.0 <= reports[1].survived <= 1.0 and reports[1].score == one.best_score > 0.0
+    assert 0.0 <= reports[1].survived <= 1.0 and reports[1].score == one.best.score > 0.0
     assert 0.0 < reports[0].cost < 100.0 and reports[1].sigma == one.policy.sigma.mean()
     for report in reports:
         assert report.samples_per_second > 0.0 and 0.0 < report.outside < 1.0
@@ -129,8 +130,8 @@ def test_the_first_result_comes_with_the_first_check(task):
     assert one.result is None
     one.iterate()
     result = one.result
-    np.testing.assert_array_equal(result["M"], one.best.M)
-    np.testing.assert_array_equal(result["states.joint_qd"], one.best_starts.joint_qd)
+    np.testing.assert_array_equal(result["M"], one.best.policy.M)
+    np.testing.assert_array_equal(result["states.joint_qd"], one.best.starts.joint_qd)
 
 
 @pytest.mark.parametrize("worlds", [63, 48])
@@ -157,10 +158,10 @@ def test_being_thrown_about_breaks_nothing(task):
     report = one.iterate()
     assert report.falls >= ISLANDS * SMALL.walk // 4
     one.iterate()
-    for policy in (one.policy, one.mean, one.best):
+    for policy in (one.policy, one.mean, one.best.policy):
         assert all(np.isfinite(x).all() for x in vars(policy).values())
     assert all(np.isfinite(x).all() for x in vars(one.starts).values())
-    assert np.isfinite(one.check()) and not np.isnan(one.best_score)
+    assert np.isfinite(one.check()) and not np.isnan(one.best.score)
 
 
 def test_where_nobody_stands_the_cost_is_unknown(task, monkeypatch):
@@ -177,18 +178,18 @@ def test_the_best_policy_is_kept(task):
     """Whatever comes after it."""
     one = learner(task)
     one.check()
-    first = one.best_score
-    good, one.best_score = one.policy, first + 0.1
-    one.best = good
+    first = one.best.score
+    good = one.policy
+    one.best = Kept(good, one.starts, first + 0.1)
     one.policy = random = one.policy.copy()
     random.a_hat += 1.0  # falls over
     one.mean = random
     assert one.check() < 0.5
-    assert one.best is good and one.best_score == first + 0.1
-    one.best_score = -1.0
+    assert one.best.policy is good and one.best.score == first + 0.1
+    one.best.score = -1.0
     one.check()
-    np.testing.assert_array_equal(one.best.a_hat, random.a_hat)
-    assert one.best is not random
+    np.testing.assert_array_equal(one.best.policy.a_hat, random.a_hat)
+    assert one.best.policy is not random
 
 
 def test_of_two_better_ones_the_better_is_kept(task, monkeypatch):
@@ -204,10 +205,10 @@ def test_of_two_better_ones_the_better_is_kept(task, monkeypatch):
 
     monkeypatch.setattr(samcon, "_try", tried)
     one.check()
-    assert one.best_score == 0.6 and one.best_starts is starts["policy"]
+    assert one.best.score == 0.6 and one.best.starts is starts["policy"]
     scores["mean"], scores["policy"] = 0.7, 0.65
     one.check()
-    assert one.best_score == 0.7 and one.best_starts is starts["mean"]
+    assert one.best.score == 0.7 and one.best.starts is starts["mean"]
 
 
 def test_learning_makes_the_dribble_stand_more(task):
