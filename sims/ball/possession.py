@@ -42,7 +42,7 @@ PARTING, PARTING_SPREAD = 0.6, 0.4
 """[m/s] The same of how fast the palms part ..."""
 CLOSING, CLOSING_SPREAD = 0.4, 0.2
 """... and come together: they have no ball between them yet."""
-PASSING, PASSING_SPREAD = 1.5, 0.5
+PASSING, PASSING_SPREAD = 2.0, 0.5
 """[m/s] The same of one hand's velocity seen from the other."""
 THICK, THICK_SPREAD = 0.18, 0.02
 """[m] The same of the palms' distance, which cannot be less than a ball."""

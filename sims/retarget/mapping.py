@@ -37,6 +37,9 @@ class Mapping:
     """Further bodies whose origin lies where that joint is; limbs are known from `arms` and `legs`."""
     palms: dict[str, tuple[str, str, str, str]] = field(default_factory=dict)
     """Hand -> wrist, index, middle and little knuckle, whose places are trusted more than rotations."""
+    supinated: dict[str, float] = field(default_factory=dict)
+    """Hand of `palms` -> [deg] by which its palm turns further to the thumb's side, about where the fingers
+    point, for recordings that are known to pronate hands too much."""
     smoothed: dict[str, float] = field(default_factory=dict)
     """Body -> cut-off [Hz] of a low-pass filter, for joints the recording shows with noise."""
     rest: Literal["told", "recorded", "directions"] = "told"
@@ -87,6 +90,7 @@ class Mapping:
             ("bodies", model.body_names),
             ("points", model.body_names),
             ("palms", model.body_names),
+            ("supinated", self.palms),
             ("smoothed", model.body_names),
             ("arms", model.joint_names),
             ("legs", model.joint_names),
@@ -94,9 +98,9 @@ class Mapping:
             for key in getattr(self, table):
                 if key not in there:
                     what = "joint" if table in ("arms", "legs") else "body"
+                    who = "palms has" if table == "supinated" else "the model has"
                     raise MappingError(
-                        f"{self.name}: {table}.{key}: the model has no {what} '{key}'; "
-                        f"it has {', '.join(there)}"
+                        f"{self.name}: {table}.{key}: {who} no {what} '{key}'; it has {', '.join(there)}"
                     )
         for hand in self.palms:
             if (hand, 3) not in [(h, len(k)) for h, k in zip(model.roles.hands, model.roles.knuckles)]:
@@ -170,6 +174,10 @@ def _entry(name: str, table: str, key: str, value: Any) -> Any:
     if table == "smoothed":
         number = isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1e4
         _expect(number, name, place, "should be a frequency in Hz")
+        return float(value)
+    if table == "supinated":
+        number = isinstance(value, int | float) and not isinstance(value, bool) and -180.0 <= value <= 180.0
+        _expect(number, name, place, "should be an angle from -180 to 180 degrees")
         return float(value)
     if table in ("bodies", "points"):
         _expect(isinstance(value, str), name, place, "should be the name of a joint")

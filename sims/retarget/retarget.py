@@ -267,17 +267,23 @@ def _body_rotations(
     for body, joint in mapping.bodies.items():
         turned[body] = since(joint) * match.get(body, Rotation.identity())
         if body in mapping.palms:
-            turned[body] = _palm(model, body, [positions[:, motion.index(j)] for j in mapping.palms[body]])
+            places = [positions[:, motion.index(j)] for j in mapping.palms[body]]
+            turned[body] = _palm(model, body, places, np.radians(mapping.supinated.get(body, 0.0)))
     return turned
 
 
-def _palm(model: Model, hand: str, places: list[np.ndarray]) -> Rotation:
-    """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]."""
-    knuckles = model.roles.knuckles[model.roles.hands.index(hand)]
+def _palm(model: Model, hand: str, places: list[np.ndarray], supinated: float) -> Rotation:
+    """World rotation of a hand from its wrist and knuckles; places: four of (frames, 3) [m]. supinated: [rad]
+    by which the palm turns to the thumb's side from there."""
+    side = model.roles.hands.index(hand)
+    knuckles = model.roles.knuckles[side]
     own = [model.zero_pose[model.body(name), :3] for name in (hand, *knuckles)]
     wrist, index, middle, little = places
     now = pose.frame_of(middle - wrist, index - little)
-    return now * pose.frame_of(own[2] - own[0], own[1] - own[3]).inv()
+    fingers, thumb = own[2] - own[0], own[1] - own[3]
+    out = np.cross(fingers, thumb) * (1.0 - 2.0 * side)
+    axis = np.cross(out, thumb) / np.linalg.norm(np.cross(out, thumb))
+    return now * pose.frame_of(fingers, thumb).inv() * Rotation.from_rotvec(supinated * axis)
 
 
 def _fill_joints(

@@ -68,7 +68,7 @@ def test_a_recording_is_the_same_on_both(player, other, mocap, clip):
     motion, _ = read_clip(mocap / clip)
     motion = motion.slice(0, min(motion.frame_count, 300) - 1)
     mapping = read_mapping("cmu" if clip.startswith("cmu") else "ballplay")
-    fields = ("bodies", "arms", "legs", "points", "palms", "smoothed")
+    fields = ("bodies", "arms", "legs", "points", "palms", "supinated", "smoothed")
     theirs = replace(mapping, **{name: rename(getattr(mapping, name)) for name in fields})
     one, two = retargeted(player, motion, mapping), retargeted(other, motion, theirs)
     np.testing.assert_array_equal(one.reference.joint_q, two.reference.joint_q)

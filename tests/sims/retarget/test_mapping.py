@@ -98,6 +98,7 @@ def test_all_that_is_missing_is_listed(space):
         (('[legs]\nl_knee = ["D", "E", "F"]\n', ""), "legs: missing"),
         (("[bodies]", "[bodies"), "not TOML"),
         (("[legs]", "[smoothed]\nl_hand = -1\n[legs]"), r"smoothed\.l_hand: should be a frequency"),
+        (("[legs]", "[supinated]\nl_hand = 200\n[legs]"), r"supinated\.l_hand: should be an angle from -180"),
     ],
 )
 def test_a_wrong_file_is_said_with_name_and_key(change, said):
