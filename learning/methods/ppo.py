@@ -28,8 +28,8 @@ from ..policies.network import NetworkPolicy
 from ..rollout import Controller, Rollout
 from ..runs.stage import Context, Report, Stage, known
 from ..starts import Starts, Streams
-from ..tasks.arms import STATES, Arms, BallWeights, misplaced
-from ..tasks.balls import Balls
+from ..tasks.arms import RESTITUTION, STATES, Arms, BallWeights, misplaced
+from ..tasks.balls import Balls, widened
 from ..tasks.disturbance import Disturbance, Disturber
 from . import samcon
 from .ball import STAGE as BALL
@@ -79,7 +79,7 @@ class PpoConfig:
     sensor_noise: float = 0.05
     """standard deviation of what is added to what is felt, in units of the state"""
     disturbance: Disturbance = field(default=Disturbance(push=150.0))
-    """pushes, and what balls differ by, grow with the noise of starts"""
+    """pushes grow with the noise of starts"""
     enough: float = 0.99
     """share of the trials to survive, from starts as disturbed as they shall be, after which it is done"""
     episode: int = 200
@@ -99,7 +99,8 @@ class PpoConfig:
 
 BASES = ("linear", "offsets", "nothing")
 EASY, HARDER, FEW = 0.2, 1.03, 0.02
-"""Starts are disturbed by so much at first, and by so much more each time that fewer fragments fail."""
+"""Starts are disturbed by so much at first, and by so much more each time that fewer fragments fail; so are
+balls, each end of their ranges by the fragments that fail near it."""
 POOL = 2048
 """States of the policy's own way that are kept to start from."""
 KEPT = 64
@@ -116,6 +117,8 @@ class Progress(Report):
     """times that a ball was lost, or a player fell, in a thousand fragments"""
     hardness: float
     """share of the disturbances that starts had"""
+    least_restitution: float
+    """of the balls"""
     sigma: float
     """[rad] mean exploration"""
     rate: float
@@ -179,6 +182,8 @@ class Ppo:
         self.disturber = Disturber(c.disturbance, Streams([random], task.worlds))
         start = self._starts(random, task.worlds)
         self.rollout = Rollout(task, self._drawn(random), self._walk(random), start, self.disturber)
+        self.ranges = np.full((2, 2), EASY)
+        """share of what balls may differ by at each end, which grows where they are kept"""
         self.spread = random.uniform(-1.0, 1.0, (task.worlds, 2))
         """(worlds, 2) where in its range what each world's ball has is"""
         self.balls = Balls(c.restitution, c.mass)
@@ -225,6 +230,7 @@ class Ppo:
         self.policy = replace(self.policy, network=network)
         if batch.failed.mean() < FEW:
             self.hardness = min(1.0, HARDER * self.hardness)
+        self.ranges = widened(self.ranges, self.spread, batch.failed.mean(axis=0), FEW, HARDER)
         self.iteration += 1
         survived = np.nan
         if self.iteration % self.config.check_every == 0 or self.done:
@@ -236,6 +242,7 @@ class Ppo:
             reward=float(batch.reward.mean()),
             lost=1e3 * float(batch.failed.mean()),
             hardness=self.hardness,
+            least_restitution=RESTITUTION - self.ranges[0, 0] * self.config.restitution,
             sigma=self.config.sigma * float(np.exp(batch.log_sigma).mean()),
             rate=self.nets.rate,
             score=self.best.score,
@@ -250,7 +257,7 @@ class Ppo:
         self.rollout.controller, self.rollout.chooser = drawn, self._walk(random)
         self.disturber.streams = Streams([random], task.worlds)
         self.disturber.what = replace(c.disturbance, push=self.hardness * c.disturbance.push)
-        self.balls.put(task, self.hardness, self.spread)
+        self.balls.put(task, self.ranges, self.spread)
         shape = (c.steps, task.worlds)
         x = np.empty((c.steps + 1, task.worlds, task.obs), np.float32)
         k = np.empty((c.steps + 1, task.worlds), int)
@@ -331,6 +338,7 @@ class Ppo:
         )
         numbers = {"iteration": self.iteration, "enough": self._enough, "hardness": self.hardness}
         own = {"age": self.age, "k": self.rollout.k, "mean": self.policy.mean, "scale": self.policy.scale}
+        own["ranges"] = self.ranges
         return arrays | {name: np.array(part) for name, part in (numbers | own).items()}
 
     def restore(self, state: Arrays) -> None:
@@ -346,7 +354,7 @@ class Ppo:
             self.policy, mean=state["mean"], scale=state["scale"], network=self.nets.network()
         )
         self.iteration, self._enough = int(state["iteration"]), bool(state["enough"])
-        self.hardness = float(state["hardness"])
+        self.hardness, self.ranges = float(state["hardness"]), np.array(state["ranges"])
 
 
 # ------------------------------------------------------------------------------------------------- stage

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpdribble.learning.tasks.arms import RESTITUTION
-from warpdribble.learning.tasks.balls import Balls
+from warpdribble.learning.tasks.balls import Balls, widened
 from warpdribble.sims import Model, Simulation
 
 WORLDS = 5
@@ -70,3 +70,37 @@ def test_they_weigh_as_they_were_drawn(task):
     v = np.abs(task.sim.joint_qd[:, speed])
     v[:, task.up] = 0.0
     np.testing.assert_allclose(v.max(axis=1), 0.01 * 4.0 / (mass * (1.0 + 0.15 * DRAWN[:, 1])), rtol=2e-3)
+
+
+def test_each_end_has_a_share_of_its_own(task):
+    Balls(restitution=0.15).put(task, np.array([[0.4, 1.0], [0.3, 0.3]]), DRAWN)
+    wanted = 0.15 * DRAWN[:, 0] * np.where(DRAWN[:, 0] < 0.0, 0.4, 1.0)
+    np.testing.assert_allclose(bounced(task), RESTITUTION + wanted, atol=0.005)
+
+
+def test_ends_go_out_where_balls_near_them_are_kept():
+    """Less restitution is lost too often, a little too often on the other side; of masses, one end is as far
+    as it goes, and at the other nobody had a ball."""
+    drawn = np.array([[-0.9, 0.95], [-0.85, 0.0], [0.0, 0.9], [0.9, 0.5], [0.5, -0.7]])
+    lost = np.array([0.08, 0.02, 0.0, 0.03, 1.0])
+    share = np.array([[0.5, 0.5], [0.5, 0.98]])
+    got = widened(share, drawn, lost, few=0.02, by=1.1)
+    np.testing.assert_allclose(got, [[0.5 / 1.1, 0.5], [0.5, 0.98 / 1.0]])
+    lost[:] = 0.0
+    got = widened(share, drawn, lost, few=0.02, by=1.1)
+    np.testing.assert_allclose(got, [[0.55, 0.55], [0.5, 1.0]])
+    for _ in range(99):
+        got = widened(got, drawn, np.ones(5), few=0.02, by=1.1)
+    np.testing.assert_allclose(got, [[0.1, 0.1], [0.5, 0.1]])
+
+
+def test_what_is_kept_goes_out_to_the_end():
+    """Where balls are lost beyond a place, the end settles near it, from either side."""
+    rng = np.random.default_rng(0)
+    share = np.array([[0.1, 1.0], [0.1, 0.1]])
+    for _ in range(200):
+        drawn = rng.uniform(-1.0, 1.0, (1024, 2))
+        ends = np.where(drawn < 0.0, *share.T)
+        lost = 0.1 * (np.abs(ends[:, 0] * drawn[:, 0]) > 0.6)
+        share = widened(share, drawn, lost, few=0.02, by=1.03)
+    assert np.all((share[0] > 0.6) & (share[0] < 0.75)) and np.all(share[1] == 1.0)
