@@ -17,7 +17,7 @@ DEVICES = ["cpu", pytest.param("cuda", marks=pytest.mark.gpu)]
 """On a CPU these tests compare it with itself: what they say is right where there is no GPU, too."""
 
 
-@pytest.mark.parametrize("module", ["step", "loose", "observe", "place", "port", "probe"])
+@pytest.mark.parametrize("module", ["film", "step", "loose", "observe", "place", "port", "probe"])
 def test_compiles_for_sm_90(module, tmp_path):
     wp.init()
     if not wp.is_cuda_available() and not nvrtc():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from .console import check_new, say
+from .console import bar, check_new, say
 
 if TYPE_CHECKING:
     from ..learning.evaluate.tracking import Tracking
@@ -25,6 +25,9 @@ class Outputs:
     simulated, which is how a model of your own is shown."""
     usd_joints: Literal["revolute", "d6", "spherical"] = "revolute"
     """How ball joints are said in USD: revolute for MuJoCo and Newton, d6 for Omniverse and Isaac."""
+    film: Path | None = None
+    """Write a film, too: an animated .webp or .gif, which any page shows; half a second of a core for each
+    of 20 frames a second."""
     html: bool = True
     """Write the replay, a page for any browser, beside the take."""
     overwrite: bool = False
@@ -35,12 +38,15 @@ class Outputs:
 
 def check_outputs(command: Outputs) -> None:
     """Raise ValueError where the take or what goes beside it cannot be written, or is there already."""
+    from ..takes import film
     from ..takes.take import check_writable, layer_files
 
     out = check_writable(command.out)
     beside = [out.with_suffix(s) for s in (".png", ".plots.png", *([".html"] if command.html else []))]
     for other in beside:
         check_writable(other, (".png", ".html"))
+    if command.film is not None:
+        beside.append(check_writable(command.film, film.SUFFIXES))
     layers = layer_files(out).values() if out.suffix == ".usda" else ()
     check_new([out, *layers, *beside], command.overwrite)
 
@@ -53,7 +59,8 @@ def write_outputs(
     from .. import __version__
     from ..sims.trajectory import centred
     from ..skin.flesh import is_player
-    from ..takes import Take, validate, write_plots, write_sheet, write_take
+    from ..takes import Take, validate, write_film, write_plots, write_sheet, write_take
+    from ..takes.film import frame_count
     from ..takes.usdjoints import left_out
     from ..web import write_replay
 
@@ -73,7 +80,7 @@ def write_outputs(
     plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
     title = f"{source}, root {root}"
     write_take(command.out, take, skin=skin, joints=command.usd_joints)
-    write_sheet(picture, take, heights, tracking.contacts, title)
+    write_sheet(picture, take, heights, tracking.contacts, title, skin)
     write_plots(
         plots,
         take.fps,
@@ -94,6 +101,10 @@ def write_outputs(
     say(f"pictures  {picture}, {plots.name}")
     if command.html:
         say(f"replay    {replay} (open it in a browser)")
+    if command.film is not None:
+        with bar("drawing", frame_count(take)) as progress:
+            write_film(command.film, take, skin=skin, device=command.device, progress=progress)
+        say(f"film      {command.film} ({command.film.stat().st_size / 1e6:.1f} MB)")
 
 
 def say_trajectory(model: Model, seen: Trajectory, root: str, cycles: float | None) -> Tracking:

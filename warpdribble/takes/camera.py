@@ -45,12 +45,14 @@ def add(stage: Usd.Stage, take: Take, edit: dict[str, Usd.EditTarget], places: n
     figure.animate(edit["animation"].GetLayer(), poses[:, None], [PATH])
 
 
-def following(take: Take, player: list[int]) -> tuple[np.ndarray, float]:
+def following(
+    take: Take, player: list[int], back: tuple[float, float, float] = BACK, fills: float = FILLS
+) -> tuple[np.ndarray, float]:
     """Poses (frames, 7) of a camera that goes along with the player's bodies, without their haste, and how
-    far [m] it stays away."""
+    far [m] it stays away. back, fills: as BACK and FILLS."""
     body_q = np.asarray(take.worlds[0], float)
     way = _smooth(body_q[:, player[0], :2], take.fps)
-    turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(BACK))
+    turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(back))
     frames = np.unique(np.linspace(0, len(body_q) - 1, LOOKS).round().astype(int))
     points = [_surface(take, player, body_q[f]) - [*way[f], 0.0] for f in frames]
     middle = float(np.median([0.5 * (p[:, 2].min() + p[:, 2].max()) for p in points]))
@@ -58,7 +60,7 @@ def following(take: Take, player: list[int]) -> tuple[np.ndarray, float]:
     distance = 4.0
     for _ in range(6):
         rows = [p[:, 1] / np.maximum(distance - p[:, 2], 0.1) for p in seen]
-        distance *= float(np.median([np.ptp(r) for r in rows])) * FOCAL / HEIGHT / FILLS
+        distance *= float(np.median([np.ptp(r) for r in rows])) * FOCAL / HEIGHT / fills
     eyes = np.concatenate([way, np.full((len(way), 1), middle)], axis=1) + distance * turn.as_matrix()[:, 2]
     return np.concatenate([eyes, np.tile(turn.as_quat(), (len(eyes), 1))], axis=1), distance
 
