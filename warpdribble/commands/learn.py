@@ -84,7 +84,7 @@ class Learn:
         run = Run.begin(self.out, skill_fields(one), self.seed)
         say(f"skill     {one.name}: {one.description}")
         run.keep(skill_text(one), lambda: self._graph(one))
-        graph = run.graph
+        graph = self._fits(run.graph, one)
         say(
             f"graph     {graph.count} fragments of {graph.period:g} s, "
             f"time stretched by {100.0 * (graph.stretch - 1.0):+.1f} %"
@@ -133,6 +133,15 @@ class Learn:
         graph, notes = skill_graph(one, self.data)
         for note in notes:
             say(f"          {note}")
+        return self._fits(graph, one)
+
+    def _fits(self, graph: Any, one: Skill) -> Any:
+        """The graph. Raises InputError where the stage that is named needs cycles and it has none."""
+        from ..sims.errors import InputError
+
+        if graph.tracked and self.stage not in ("", "ball"):
+            reason = f"'{one.name}' is not cyclic: only the stage ball is for what happens once"
+            raise InputError(reason, hint="stage")
         return graph
 
     def _learn(self, run: Run, stage: Stage) -> int:

@@ -89,9 +89,7 @@ class Camera:
         device = self._out.device
         self._mesh.points.assign(points.astype(np.float32))
         self._mesh.refit()
-        shading: Any = wp.array(
-            normals(points, self._faces).astype(np.float32), dtype=wp.vec3, device=device
-        )
+        shading: Any = wp.array(normals(points, self._faces).astype(np.float32), dtype=wp.vec3, device=device)
         wp.launch(
             kernel.photograph,
             dim=self._out.shape,

@@ -229,6 +229,14 @@ def test_what_cannot_be_learned(capsys, tmp_path, monkeypatch, skill, said):
     assert not list(tmp_path.glob("run/*"))
 
 
+@pytest.mark.parametrize("stage", ["locomotion", "policy"])
+def test_legs_are_not_learned_for_what_happens_once(capsys, tmp_path, stage):
+    (tmp_path / "once.toml").write_text('name = "mine"\nauthored = "waist"\n')
+    said = refused(capsys, "learn", tmp_path / "once.toml", "--stage", stage, "--out", tmp_path / "run")
+    assert "'mine' is not cyclic: only the stage ball is for what happens once; give another --stage" in said
+    assert not list(tmp_path.glob("run/*"))
+
+
 def test_a_recording_is_cut_before_it_is_learned(capsys, tmp_path, cmu_clip):
     """What to do is said; `--frames` says which part, also that it is all of it."""
     said = refused(capsys, "learn", cmu_clip, "--out", tmp_path / "run")
