@@ -1,9 +1,10 @@
-"""The loops of docs/gallery.md: what ships, and runs, at work.
+"""The loops of docs/gallery.md, and strips of eight moments of a cycle: what ships, and runs, at work.
 
     python -m warpdribble.reports.gallery docs/pictures [RUN ...]
 
 writes a short film of each controller that ships, of the demo's player pushed, and of each run, as
-loop-NAME.webp: whole cycles, so that they go on without a jump, as far as the motion does.
+loop-NAME.webp: whole cycles, so that they go on without a jump, as far as the motion does; and
+strip-NAME.png.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from ..learning import Run, Streams
 from ..learning.evaluate.pushes import PUSH_TIME, Push
@@ -21,7 +23,7 @@ from ..learning.graph import STEPS
 from ..learning.methods import STAGES
 from ..learning.runs.folder import shipped_controllers
 from ..sims.trajectory import centred
-from ..takes.film import write_film
+from ..takes.film import Camera, write_film
 from ..takes.take import Take
 
 SECONDS = 3.0
@@ -29,6 +31,7 @@ SECONDS = 3.0
 SETTLED = 40
 """Fragments before it begins."""
 SIZE = (300, 400)
+MOMENTS, MOMENT = 8, (150, 240)
 PUSHED, PUSH = "dribble-right-authored", 150.0
 """Who is pushed, and how much [N]."""
 
@@ -56,7 +59,19 @@ def write_loop(loop: Loop, folder: Path) -> Path:
     take = Take.of(task.model, seen.body_q.astype(float), 1.0 / task.model.timestep)
     path = folder / f"loop-{loop.name}.webp"
     write_film(path, take, first=STEPS * lead, count=STEPS * cycles * cycle, size=SIZE)
+    if not loop.push:
+        frames = STEPS * lead + np.arange(MOMENTS) * STEPS * cycle // MOMENTS
+        strip(take, frames).save(folder / f"strip-{loop.name}.png", optimize=True)
     return path
+
+
+def strip(take: Take, frames: np.ndarray) -> Image.Image:
+    """Pictures of frames side by side."""
+    seen = Camera(take, MOMENT, samples=3)
+    whole = Image.new("RGB", (len(frames) * MOMENT[0], MOMENT[1]))
+    for number, frame in enumerate(frames):
+        whole.paste(seen.picture(int(frame)), (number * MOMENT[0], 0))
+    return whole
 
 
 def main(folder: Path, runs: list[str]) -> None:
