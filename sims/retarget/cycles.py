@@ -85,6 +85,12 @@ def find_cycles(
     return [_candidate(places, speed, heading, root, one, step, rate) for one in kept]
 
 
+def pose_gap(motion: Motion, mapping: Mapping, first: int, last: int) -> float:
+    """[m], `Candidate.pose_gap` of the ends of any part. Raises MappingError for joints that are missing."""
+    places, _, _ = seen_from_person(mapping.plain(motion), mapping)
+    return _rms(places[last] - places[first])
+
+
 def seen_from_person(motion: Motion, mapping: Mapping) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (frames, joints, 3) [m] of the mapping's joints without position and heading, the heading
     (frames,) [rad], the root (frames, 2) [m] over the ground."""

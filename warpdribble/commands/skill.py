@@ -75,7 +75,7 @@ class Draft(ClipFile):
     out: Path = Path("skill.toml")
     """The file to write."""
     frames: tuple[int, int] | None = None
-    """First and last frame to use; by default the best cycle that is found."""
+    """First and last frame to use, a cycle where their ends are alike; by default the best one is found."""
     whole: bool = False
     """Use the whole clip, not its best cycle."""
     name: str = ""

@@ -6,12 +6,14 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..clips.data import data_folder
 from ..clips.read import read_clip
 from ..sims import Model
 from ..sims.ball.ball import inferred_ball, recorded_ball
 from ..sims.files import whole as whole_file
-from ..sims.retarget.cycles import find_cycles
+from ..sims.retarget.cycles import find_cycles, pose_gap
 from ..sims.retarget.mapping import find_mapping, read_mapping
 from ..sims.retarget.retarget import retargeted
 
@@ -29,8 +31,8 @@ def draft(
     **reading: Any,
 ) -> str:
     """The text of a skill's file. frames: None takes the best cycle of the clip, or all of it (always when
-    `whole`). reading: how the clip is read, as `clips.read_clip` takes it. Raises ClipError and
-    MappingError (ValueErrors)."""
+    `whole`); others are a cycle where their ends are alike. reading: how the clip is read, as
+    `clips.read_clip` takes it. Raises ClipError and MappingError (ValueErrors)."""
     motion, _ = read_clip(clip, **reading)
     wanted = read_mapping(mapping) if mapping else find_mapping(motion)
     cyclic, others, searched = False, [], frames is None and not whole
@@ -40,6 +42,9 @@ def draft(
         cyclic, others = bool(found), found[1:5]
     first, last = frames[0], motion.frame_count - 1 if frames[1] == -1 else frames[1]
     part = motion.slice(first, last)
+    apart = np.nan if searched else pose_gap(part, wanted, 0, part.frame_count - 1)
+    if not (searched or whole):
+        cyclic = apart < GOOD
     result = retargeted(model, part, wanted)
     ball = recorded_ball(model, result, part)
     if ball is None:
@@ -59,6 +64,9 @@ def draft(
     lines += _as_read(reading)
     if searched and not cyclic:
         lines.append(f"# all of it, once: no part ends within {100 * GOOD:.0f} cm of how it begins")
+    elif not searched:
+        once = f"once; cyclic = true bends them to meet, as is done unasked below {100 * GOOD:.0f} cm"
+        lines.append(f"# its ends are {100 * apart:.1f} cm apart: {'a cycle' if cyclic else once}")
     for c in others:
         lines.append(f"# also a cycle: frames = [{c.first}, {c.last}], ends {100 * c.pose_gap:.1f} cm apart")
     if ball is None:

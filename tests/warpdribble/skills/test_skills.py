@@ -111,6 +111,15 @@ def test_a_draft_is_a_skill_that_plays(player, mocap, tmp_path, monkeypatch):
     assert stage_skill(player, one).ball.touch.any()
 
 
+@pytest.mark.parametrize(
+    ("frames", "cyclic", "said"),
+    [((118, 241), True, "3.4 cm apart: a cycle"), ((118, 180), False, "cm apart: once; cyclic = true bends")],
+)
+def test_frames_that_end_as_they_begin_are_a_cycle(player, mocap, frames, cyclic, said):
+    text = draft(player, mocap / "cmu" / "06_04.bvh", frames)
+    assert parse_skill(text, "mine.toml").cyclic == cyclic and said in text
+
+
 def test_a_draft_reads_its_clip_as_it_was_told_to(player, cmu_clip):
     text = draft(player, cmu_clip, whole=True, units="cmu", up="y", rate=100.0, drop_positions=True)
     one = parse_skill(text, "mine.toml")
