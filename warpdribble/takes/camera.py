@@ -25,6 +25,8 @@ FILLS = 0.5
 """Share of the frame's height that the player takes up."""
 STEADY = 0.5
 """[Hz] The camera takes no part in what moves faster: steps, sway, the ball's rhythm."""
+MOST = 0.95
+"""Share of the time for which the frame is wide enough, where a player stands up or crouches."""
 LOOKS = 40
 """Frames whose player is measured."""
 
@@ -55,12 +57,14 @@ def following(
     turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(back))
     frames = np.unique(np.linspace(0, len(body_q) - 1, LOOKS).round().astype(int))
     points = [_surface(take, player, body_q[f]) - [*way[f], 0.0] for f in frames]
-    middle = float(np.median([0.5 * (p[:, 2].min() + p[:, 2].max()) for p in points]))
+    low, high = (np.array([end(p[:, 2]) for p in points]) for end in (np.min, np.max))
+    bottom, top = float(np.quantile(low, 1.0 - MOST)), float(np.quantile(high, MOST))
+    middle, taller = 0.5 * (bottom + top), (top - bottom) / float(np.median(high - low))
     seen = [turn.inv().apply(p - [0.0, 0.0, middle]) for p in points]
     distance = 4.0
     for _ in range(6):
         rows = [p[:, 1] / np.maximum(distance - p[:, 2], 0.1) for p in seen]
-        distance *= float(np.median([np.ptp(r) for r in rows])) * FOCAL / HEIGHT / fills
+        distance *= taller * float(np.median([np.ptp(r) for r in rows])) * FOCAL / HEIGHT / fills
     eyes = np.concatenate([way, np.full((len(way), 1), middle)], axis=1) + distance * turn.as_matrix()[:, 2]
     return np.concatenate([eyes, np.tile(turn.as_quat(), (len(eyes), 1))], axis=1), distance
 
