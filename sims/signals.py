@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 
@@ -37,6 +36,8 @@ def low_pass(values: np.ndarray, rate: float, cut_off: float) -> np.ndarray:
     so that nothing is delayed; what is too short or too slow to filter is returned as it is."""
     if len(values) < 16 or cut_off >= 0.45 * rate:
         return values
+    from scipy.signal import butter, sosfiltfilt  # a second to import, which not every command needs
+
     return sosfiltfilt(butter(2, cut_off, fs=rate, output="sos"), values, axis=0)
 
 

@@ -19,6 +19,7 @@ from . import clothes, flesh
 from .clothes import Patch
 from .cut import Net, cut, onto, refine
 from .implicit import FAR, Union
+from .kept import kept
 from .meshes import Mesh, normals
 from .surface_net import line, neighbours, sew, surface_net
 
@@ -72,17 +73,34 @@ _built: dict[int, tuple[Model, Skin]] = {}
 
 
 def of(model: Model) -> Skin:
-    """The skin of a model; built once, in about two seconds. Raises ValueError where there is nothing to
-    cover."""
+    """The skin of a model; built once, in some seconds, and kept in the user's cache. Raises ValueError
+    where there is nothing to cover."""
     if id(model) not in _built:
-        _built[id(model)] = model, _build(model)
+        if not flesh.of(model):
+            raise ValueError("the model has no shapes to put a skin on")
+        bind = zero_pose(model)
+        arrays = kept(model, bind, KEPT, lambda: _arrays(_build(model)))
+        _built[id(model)] = model, _of_arrays(model, bind, arrays)
     return _built[id(model)][1]
+
+
+KEPT = ("points", "normals", "faces", "bodies", "weights", "region", "regions")
+"""Arrays that take time to build."""
+
+
+def _arrays(skin: Skin) -> dict[str, np.ndarray]:
+    return {name: np.asarray({**vars(skin), **vars(skin.mesh)}[name]) for name in KEPT}
+
+
+def _of_arrays(model: Model, bind: np.ndarray, arrays: dict[str, np.ndarray]) -> Skin:
+    own, regions = flesh.colours(model), [str(name) for name in arrays["regions"]]
+    mesh = Mesh(*(arrays[name] for name in ("points", "normals", "faces")))
+    colours = {name: own[name] for name in regions}
+    return Skin(mesh, arrays["bodies"], arrays["weights"], regions, arrays["region"], colours, bind)
 
 
 def _build(model: Model) -> Skin:
     lumps = flesh.of(model)
-    if not lumps:
-        raise ValueError("the model has no shapes to put a skin on")
     bind = zero_pose(model)
     body_of = {name: i for i, name in enumerate(model.body_names)}
     union = Union(lumps, body_of, bind)

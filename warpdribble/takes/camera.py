@@ -27,6 +27,8 @@ STEADY = 0.5
 """[Hz] The camera takes no part in what moves faster: steps, sway, the ball's rhythm."""
 MOST = 0.95
 """Share of the time for which the frame is wide enough, where a player stands up or crouches."""
+EVERY = 3
+"""Of a shape's points one in so many is looked at."""
 LOOKS = 40
 """Frames whose player is measured."""
 
@@ -56,15 +58,15 @@ def following(
     way = _smooth(body_q[:, player[0], :2], take.fps)
     turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(back))
     frames = np.unique(np.linspace(0, len(body_q) - 1, LOOKS).round().astype(int))
-    points = [_surface(take, player, body_q[f]) - [*way[f], 0.0] for f in frames]
-    low, high = (np.array([end(p[:, 2]) for p in points]) for end in (np.min, np.max))
+    points = _surface(take, player, body_q[frames]) - np.pad(way[frames], ((0, 0), (0, 1)))[:, None]
+    low, high = points[..., 2].min(axis=1), points[..., 2].max(axis=1)
     bottom, top = float(np.quantile(low, 1.0 - MOST)), float(np.quantile(high, MOST))
     middle, taller = 0.5 * (bottom + top), (top - bottom) / float(np.median(high - low))
-    seen = [turn.inv().apply(p - [0.0, 0.0, middle]) for p in points]
+    seen = (points - [0.0, 0.0, middle]) @ turn.as_matrix()
     distance = 4.0
     for _ in range(6):
-        rows = [p[:, 1] / np.maximum(distance - p[:, 2], 0.1) for p in seen]
-        distance *= taller * float(np.median([np.ptp(r) for r in rows])) * FOCAL / HEIGHT / fills
+        rows = seen[..., 1] / np.maximum(distance - seen[..., 2], 0.1)
+        distance *= taller * float(np.median(np.ptp(rows, axis=1))) * FOCAL / HEIGHT / fills
     eyes = np.concatenate([way, np.full((len(way), 1), middle)], axis=1) + distance * turn.as_matrix()[:, 2]
     return np.concatenate([eyes, np.tile(turn.as_quat(), (len(eyes), 1))], axis=1), distance
 
@@ -95,11 +97,12 @@ def _toward(back: np.ndarray) -> Rotation:
 
 
 def _surface(take: Take, bodies: list[int], body_q: np.ndarray) -> np.ndarray:
-    """Points (n, 3) [m] of the shapes of some bodies in body_q (nbody, 7); their places where there are
-    none."""
-    points = [body_q[bodies, :3]]
+    """Points (frames, n, 3) [m] of the shapes of some bodies in body_q (frames, nbody, 7); their places where
+    there are none."""
+    points = [body_q[:, bodies, :3]]
     for shape in take.shapes:
         if shape.body in bodies and shape.kind != "plane":
-            turn = Rotation.from_quat(body_q[shape.body, 3:])
-            points.append(turn.apply(shape_mesh(shape).points) + body_q[shape.body, :3])
-    return np.concatenate(points)
+            turn = Rotation.from_quat(body_q[:, shape.body, 3:]).as_matrix()
+            own = np.asarray(shape_mesh(shape).points)[::EVERY]
+            points.append(own @ turn.transpose(0, 2, 1) + body_q[:, shape.body, None, :3])
+    return np.concatenate(points, axis=1)
