@@ -91,6 +91,11 @@ class Cycle:
         anchor = self.reference.joint_q[0, model.q_slice(model.root)][:2]
         return over_ground(poses, anchor, anchor + np.asarray(self.travel), self.turn)
 
+    def behind(self, model: Model, poses: np.ndarray) -> np.ndarray:
+        """Where poses (n, 7) [m, -] or points (n, 3) [m] of a cycle were in the one before."""
+        anchor = self.reference.joint_q[0, model.q_slice(model.root)][:2]
+        return over_ground(poses, anchor + np.asarray(self.travel), anchor, -self.turn)
+
     def _carried(self, model: Model) -> list[slice]:
         """Where what is loose and goes along, as a dribbled ball, is in joint_q."""
         loose = [joint.q for joint in model.joints[1:] if joint.kind == "free"]

@@ -16,6 +16,7 @@ from ..sims.files import whole as whole_file
 from ..sims.retarget.cycles import find_cycles, pose_gap
 from ..sims.retarget.mapping import find_mapping, read_mapping
 from ..sims.retarget.retarget import retargeted
+from .staged import closed, cycle_ball
 
 GOOD = 0.06
 """[m] of pose gap up to which a cycle is proposed unasked."""
@@ -47,7 +48,9 @@ def draft(
         cyclic = apart < GOOD
     result = retargeted(model, part, wanted)
     ball = recorded_ball(model, result, part)
-    if ball is None:
+    if ball is None and cyclic:
+        ball = cycle_ball(model, closed(model, result.reference), result.scale)
+    elif ball is None:
         ball = inferred_ball(model, result.reference, result.scale)
     elif not ball.touch.any():
         ball = None

@@ -70,21 +70,25 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
     """The skill on a model. Raises SkillError for a clip that is missing or cannot be used."""
     if model.roles.ball is None:
         skill = replace(skill, ball=False)
+    hidden = None
     if skill.authored:
         reference, ball, notes = _authored(model, skill)
     else:
-        reference, ball, notes = _recorded(model, skill, data)
+        reference, ball, notes, hidden = _recorded(model, skill, data)
+    written = bool(skill.contact or skill.checkpoints)
+    if skill.cyclic and skill.ball and not written and hidden is not None:
+        ball = cycle_ball(model, closed(model, reference), hidden)
     notes = [*notes, *_ball_notes(skill, ball)]
     if not skill.ball:
         ball = None
-    elif skill.contact or skill.checkpoints:
+    elif written:
         ball = _as_written(model, skill, reference, ball)
     if skill.mirror:
         reference = mirrored(model, reference)
         ball = mirrored_ball(ball) if ball is not None else None
     cycle = None
     if skill.cyclic:
-        cycle = Cycle.of(model, reference) if skill.authored else _closed(model, reference)
+        cycle = Cycle.of(model, reference) if skill.authored else closed(model, reference)
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
         reference = cycle.reference
@@ -123,7 +127,8 @@ def _authored(model: Model, skill: Skill) -> tuple[Reference, Ball | None, list[
 
 def _recorded(
     model: Model, skill: Skill, data: str | Path | None
-) -> tuple[Reference, Ball | None, list[str]]:
+) -> tuple[Reference, Ball | None, list[str], float | None]:
+    """Reference, ball, notes, and, where the ball was not recorded, the scale with which it is inferred."""
     from ..clips import read_part
 
     path = find_clip(skill, data)
@@ -156,19 +161,52 @@ def _recorded(
         result = retargeted(model, motion, mapping)
     except MappingError as error:
         raise fail("mapping", str(error), error) from None
-    ball = None
+    ball, hidden = None, None
     if model.roles.ball is not None:
         ball = recorded_ball(model, result, motion)
         if ball is None:
-            ball = inferred_ball(model, result.reference, result.scale)
+            hidden = result.scale
+            ball = inferred_ball(model, result.reference, hidden)
         elif not ball.touch.any():
             ball, notes = None, [*notes, "nobody touches the recorded ball: left out"]
     notes = [*notes, *result.notes, f"joints {accuracy(model, result).summary}"]
-    return result.reference, ball, notes
+    return result.reference, ball, notes, hidden
 
 
-def _closed(model: Model, reference: Reference) -> Cycle:
-    """The cycle, with feet that closing has bent into the ground lifted out of it."""
+TURNS = 5
+"""Cycles in a row in which a ball is looked for: what the middle one shows has come from one like it."""
+
+
+def cycle_ball(model: Model, cycle: Cycle, scale: float = 1.0) -> Ball | None:
+    """The ball that the hands of a closed cycle play with again and again, as `inferred_ball` tells it."""
+    ball = inferred_ball(model, cycle.repeat(model, TURNS), scale)
+    ball = None if ball is None else _middle(model, cycle, ball)
+    return ball if ball is not None and ball.touch.any() else None
+
+
+def _middle(model: Model, cycle: Cycle, ball: Ball) -> Ball:
+    """The middle one of TURNS cycles of a ball, where the first one is."""
+    count = cycle.reference.frame_count - 1
+    first = TURNS // 2 * count
+    rows = slice(first, first + count + 1)
+    path = ball.path[rows]
+    for _ in range(TURNS // 2):
+        path = cycle.behind(model, path)
+    marks = [i for i, row in enumerate(ball.checkpoints) if first <= row < first + count]
+    flights = tuple(
+        replace(f, release=f.release - first, catch=f.catch - first)
+        for f in ball.flights
+        if first <= f.release < first + count
+    )
+    checkpoints = tuple(ball.checkpoints[i] - first for i in marks)
+    heights = tuple(ball.heights[i] for i in marks)
+    return replace(
+        ball, path=path, touch=ball.touch[rows], checkpoints=checkpoints, heights=heights, flights=flights
+    )
+
+
+def closed(model: Model, reference: Reference) -> Cycle:
+    """The cycle of a recording, with feet that closing has bent into the ground lifted out of it."""
     cycle = close_cycle(model, reference)
     joint_q = cycle.reference.joint_q.copy()
     for knee, foot in zip(model.roles.knees, model.roles.feet):
@@ -177,11 +215,14 @@ def _closed(model: Model, reference: Reference) -> Cycle:
 
 
 def _closed_ball(model: Model, ball: Ball, cycle: Cycle) -> Ball:
-    """The ball of a closed cycle: with the closed hands where it was inferred, bent to where it begins where
-    it was recorded."""
+    """The ball of a closed cycle: with the closed hands, and on its way to those of the next cycle, where it
+    was inferred; bent to where it begins where it was recorded."""
     reference = cycle.reference
     if not ball.recorded:
-        return replace(ball, path=ball_path(find_hands(model, reference), ball.touch, ball.flights))
+        touch = np.concatenate([*[ball.touch[:-1]] * TURNS, ball.touch[-1:]])
+        hands, flights = find_hands(model, cycle.repeat(model, TURNS)), flights_of(touch)
+        again = replace(ball, path=ball_path(hands, touch, flights), touch=touch, flights=flights)
+        return replace(_middle(model, cycle, again), checkpoints=ball.checkpoints, heights=ball.heights)
     share, _ = closing(reference)
     path = ball.path + smoothstep(share) * (cycle.ahead(model, ball.path[:1]) - ball.path[-1])
     path[:, 2] = np.maximum(path[:, 2], ball.path[:, 2].min())
