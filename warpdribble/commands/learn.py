@@ -206,9 +206,10 @@ class Learn:
         if rows := read_rows(folder):
             found = ""
             if "cycles" in rows[-1]:
-                found = (
-                    f": {rows[-1]['cycles']:.0f} cycles, fingers {rows[-1]['fingers']:.1f} cm from the ball"
-                )
+                known = [row["fingers"] for row in rows if math.isfinite(row["fingers"])]
+                found = ": " + ", ".join(found_cycles(rows[-1]["cycles"], known[-1] if known else math.nan))
+                if not math.isfinite(rows[-1]["fingers"]):
+                    found += "; then no way on was found"
             say(f"learned   {trained.iterations} iterations in {rows[-1]['seconds']:.0f} s{found}")
             tried = [row for row in rows if math.isfinite(row.get("survived", math.nan))]
             if tried:
@@ -230,6 +231,12 @@ BEST = " (1: all of the time survived, at no cost)"
 BESIDE = {"outside": "outside the simulation", "learning": "learning beside the simulation"}
 
 
+def found_cycles(cycles: float, fingers: float) -> list[str]:
+    """How far a trajectory goes, and how well the fingers [cm] hold the ball, where that is known."""
+    near = [f"fingers {fingers:.1f} cm from the ball"] if math.isfinite(fingers) else []
+    return [f"{cycles:.0f} cycles", *near]
+
+
 class Shown:
     """Progress of learning, as a bar, and as a line where there is no terminal."""
 
@@ -243,10 +250,7 @@ class Shown:
         self.tried = survived if math.isfinite(survived) else self.tried
         parts = [f"{100.0 * self.tried:.0f} % of the trials survived"] if math.isfinite(self.tried) else []
         if (cycles := getattr(report, "cycles", None)) is not None:
-            parts = [
-                f"{cycles} cycles",
-                f"fingers {getattr(report, 'fingers', math.nan):.1f} cm from the ball",
-            ]
+            parts = found_cycles(cycles, getattr(report, "fingers", math.nan))
         if math.isfinite(lost := getattr(report, "lost", math.nan)) and hasattr(report, "reward"):
             parts += [f"{lost:.1f} of 1000 fragments lost the ball"]
         text = ", ".join([*parts, f"cost {cost:.2f}"] if math.isfinite(cost) or not parts else parts)
