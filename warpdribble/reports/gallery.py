@@ -32,7 +32,7 @@ SETTLED = 40
 """Fragments before it begins."""
 SIZE = (300, 400)
 MOMENTS, MOMENT = 8, (150, 240)
-PUSHED, PUSH = "dribble-right-authored", 150.0
+PUSHED, PUSH = "dribble-right-authored", 100.0
 """Who is pushed, and how much [N]."""
 
 

@@ -68,14 +68,10 @@ class Camera:
         starts = np.cumsum([0, *(len(part.posed(take.worlds[0, 0])) for part in parts)])
         self._parts = parts
         self._faces = np.concatenate([part.faces + start for part, start in zip(parts, starts)])
-        points = self._points(0)
         self._colours: Any = wp.array(
             np.concatenate([part.colours for part in parts]).astype(np.float32), dtype=wp.vec3, device=device
         )
-        self._mesh = wp.Mesh(
-            wp.array(points.astype(np.float32), dtype=wp.vec3, device=device),
-            wp.array(self._faces.astype(np.int32).ravel(), dtype=int, device=device),
-        )
+        self._corners: Any = wp.array(self._faces.astype(np.int32).ravel(), dtype=int, device=device)
         self._out = wp.zeros(size[::-1], dtype=wp.vec3, device=device)
         player = [b for b, name in enumerate(take.body_names) if name != take.ball]
         self._poses, _ = camera.following(take, player, back, fills)
@@ -87,13 +83,13 @@ class Camera:
         """What is seen in a frame."""
         points = self._points(frame)
         device = self._out.device
-        self._mesh.points.assign(points.astype(np.float32))
-        self._mesh.refit()
+        # built anew, as bounds that are refitted grow loose where the ball goes away: ten times as slow
+        mesh = wp.Mesh(wp.array(points.astype(np.float32), dtype=wp.vec3, device=device), self._corners)
         shading: Any = wp.array(normals(points, self._faces).astype(np.float32), dtype=wp.vec3, device=device)
         wp.launch(
             kernel.photograph,
             dim=self._out.shape,
-            inputs=[self._mesh.id, shading, self._colours, self._look(frame), self.samples, self._out],
+            inputs=[mesh.id, shading, self._colours, self._look(frame), self.samples, self._out],
             device=device,
         )
         linear = np.clip(self._out.numpy(), 0.0, 1.0)
