@@ -26,8 +26,6 @@ from ..sims import Model
 
 TRIALS = 64
 SECONDS = 20.0
-SLIPS = 0.8
-"""Friction as the player's file has it."""
 RESTITUTIONS = (0.6, 0.65, 0.7, 0.75, 0.78, 0.8, 0.82, 0.85, 0.9, 0.95)
 MASSES = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3)
 PUSHES = (0.0, 50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
@@ -94,6 +92,12 @@ def measure(one: Learned) -> dict[str, Curve]:
         change(usual)
         return seen
 
+    touching = [
+        (float(pair["friction"]), {task.model.shapes[i].body for i in pair["shapes"]})
+        for pair in task.model.pairs
+    ]
+    usual = next(mu for mu, both in touching if task.model.body(ball) in both and both & fingers)
+
     def slips(friction: float) -> None:
         for body in hands:
             task.sim.set_contact(ball, body, friction=friction)
@@ -105,7 +109,7 @@ def measure(one: Learned) -> dict[str, Curve]:
         "mass of the ball, times": swept(MASSES, lambda m: task.sim.set_mass(ball, m * mass), 1.0),
         "largest pushes of 0.2 s, every 3 s [N]": [(force, share(push=force)) for force in PUSHES],
         "joint speed noise at the start [rad/s]": [(noise, share(noise)) for noise in NOISES],
-        "friction of ball and hands": swept(FRICTIONS, slips, SLIPS),
+        "friction of ball and hands": swept(FRICTIONS, slips, usual),
         "noise of the senses [units of the state]": [
             (noise, share(senses=Senses(one.controller, noise))) for noise in SENSORS
         ],

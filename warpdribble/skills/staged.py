@@ -76,8 +76,12 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
     else:
         reference, ball, notes, hidden = _recorded(model, skill, data)
     written = bool(skill.contact or skill.checkpoints)
-    if skill.cyclic and skill.ball and not written and hidden is not None:
-        ball = cycle_ball(model, closed(model, reference), hidden)
+    cycle = closed(model, reference) if skill.cyclic and not skill.authored else None
+    if hidden is not None:
+        if cycle is not None and skill.ball and not written:
+            ball = cycle_ball(model, cycle, hidden)
+        else:
+            ball = inferred_ball(model, reference, hidden)
     notes = [*notes, *_ball_notes(skill, ball)]
     if not skill.ball:
         ball = None
@@ -86,9 +90,11 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
     if skill.mirror:
         reference = mirrored(model, reference)
         ball = mirrored_ball(ball) if ball is not None else None
-    cycle = None
     if skill.cyclic:
-        cycle = Cycle.of(model, reference) if skill.authored else closed(model, reference)
+        if cycle is None:
+            cycle = Cycle.of(model, reference)
+        elif skill.mirror:
+            cycle = closed(model, reference)
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
         reference = cycle.reference
@@ -128,7 +134,7 @@ def _authored(model: Model, skill: Skill) -> tuple[Reference, Ball | None, list[
 def _recorded(
     model: Model, skill: Skill, data: str | Path | None
 ) -> tuple[Reference, Ball | None, list[str], float | None]:
-    """Reference, ball, notes, and, where the ball was not recorded, the scale with which it is inferred."""
+    """Reference, recorded ball, notes; where none was recorded, the scale with which one is inferred."""
     from ..clips import read_part
 
     path = find_clip(skill, data)
@@ -166,7 +172,6 @@ def _recorded(
         ball = recorded_ball(model, result, motion)
         if ball is None:
             hidden = result.scale
-            ball = inferred_ball(model, result.reference, hidden)
         elif not ball.touch.any():
             ball, notes = None, [*notes, "nobody touches the recorded ball: left out"]
     notes = [*notes, *result.notes, f"joints {accuracy(model, result).summary}"]

@@ -17,6 +17,13 @@ def delayed(one, monkeypatch, seconds):
     return one
 
 
+def ended(one):
+    """A learner, at its end."""
+    while not one.done:
+        one.iterate()
+    return one
+
+
 def same(one, other):
     """Whether two learners are the same to the bit."""
     for name, value in one.state.items():

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from tests.learning.methods.learners import delayed, same  # noqa: E402
+from tests.learning.methods.learners import delayed, ended, same  # noqa: E402
 from warpdribble.learning import STAGES  # noqa: E402
 from warpdribble.learning.methods import ddpg  # noqa: E402
 from warpdribble.learning.methods.ddpg import DdpgConfig, Reward  # noqa: E402
@@ -158,17 +158,12 @@ def test_a_state_goes_on_to_the_bit(learned, context, tmp_path):
     one.iterate()
     other = ddpg.make(kept)
     other.restore(state)
-    while not other.done:
-        other.iterate()
-    same(learned[0], other)
+    same(learned[0], ended(other))
 
 
 def test_a_slow_learner_simulates_the_same(learned, context, monkeypatch):
     """What is simulated beside learning does not see what is learned meanwhile, whichever is slower."""
-    one = delayed(ddpg.make(context), monkeypatch, 0.02)
-    while not one.done:
-        one.iterate()
-    same(learned[0], one)
+    same(learned[0], ended(delayed(ddpg.make(context), monkeypatch, 0.02)))
 
 
 @pytest.mark.parametrize("wrong", [{"state": "all"}, {"begin": "all"}, {"phase": "all"}])

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from tests.learning.methods.learners import delayed, same  # noqa: E402
+from tests.learning.methods.learners import delayed, ended, same  # noqa: E402
 from warpdribble.learning import STAGES, run_trials  # noqa: E402
 from warpdribble.learning.ball.optimised import Optimised  # noqa: E402
 from warpdribble.learning.methods import ppo  # noqa: E402
@@ -123,17 +123,12 @@ def test_a_state_goes_on_to_the_bit(learned, context):
     for _ in range(2):
         one.iterate()
     other.restore({name: np.array(value) for name, value in one.state.items()})
-    while not other.done:
-        other.iterate()
-    same(learned[0], other)
+    same(learned[0], ended(other))
 
 
 def test_a_slow_learner_simulates_the_same(learned, context, monkeypatch):
     """What is simulated beside learning does not see what is learned meanwhile, whichever is slower."""
-    one = delayed(ppo.make(context), monkeypatch, 0.3)
-    while not one.done:
-        one.iterate()
-    same(learned[0], one)
+    same(learned[0], ended(delayed(ppo.make(context), monkeypatch, 0.3)))
 
 
 def test_a_state_of_another_network_is_refused(learned, context):
