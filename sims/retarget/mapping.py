@@ -100,7 +100,7 @@ class Mapping:
                     what = "joint" if table in ("arms", "legs") else "body"
                     who = "palms has" if table == "supinated" else "the model has"
                     raise MappingError(
-                        f"{self.name}: {table}.{key}: {who} no {what} '{key}'; it has {', '.join(there)}"
+                        f"{self.name}: {table}.{key}: {who} no {what} '{key}'; it has {', '.join(there) or 'none'}"
                     )
         for hand in self.palms:
             if (hand, 3) not in [(h, len(k)) for h, k in zip(model.roles.hands, model.roles.knuckles)]:

@@ -176,7 +176,7 @@ def test_recordings_on_other_skeletons(player, mocap, clip):
     """Bones along X, mirrored on the right: near the file's own T-pose."""
     motion, _ = read_clip(mocap / clip)
     motion = at_its_rest(replace(motion, positions=None))
-    mapping = replace(find_mapping(motion), palms={})
+    mapping = replace(find_mapping(motion), palms={}, supinated={})
     plain = retargeted(player, motion, mapping)
     for right in (1.0, -1.0):
         mean, most = apart(player, plain, retargeted(player, in_a_line(motion, right), mapping))

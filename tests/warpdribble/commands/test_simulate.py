@@ -124,7 +124,7 @@ def test_a_recorded_ball_is_used_and_said(simulated, tmp_path, mocap, player):
         ball.path[0] - one.reference.joint_q[0, :3]
         for ball in (one.ball, inferred_ball(player, one.reference))
     )
-    assert np.linalg.norm(begins - recorded) < 0.022 < 0.1 < np.linalg.norm(begins - guessed)
+    assert np.linalg.norm(begins - recorded) < 0.022 < 0.06 < np.linalg.norm(begins - guessed)
 
 
 def test_without_the_ball_there_is_none(simulated, mocap):
