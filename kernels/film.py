@@ -42,12 +42,6 @@ class Look:
 
 
 @wp.func
-def in_the_way(mesh: wp.uint64, start: wp.vec3, along: wp.vec3, far: float) -> bool:
-    hit = wp.mesh_query_ray(mesh, start, along, far)
-    return hit.result
-
-
-@wp.func
 def on_sphere(u: float, v: float) -> wp.vec3:
     """A point of the unit sphere, evenly for u and v from 0 to 1."""
     z = 1.0 - 2.0 * u
@@ -66,12 +60,12 @@ def lit(
     facing = wp.max(0.0, wp.dot(normal, sun))
     direct = wp.vec3(0.0)
     if facing > 0.0:
-        if not in_the_way(mesh, start, sun, FAR):
+        if not wp.mesh_query_ray_anyhit(mesh, start, sun, FAR):
             direct = facing * look.sunlight
     away = wp.normalize(normal + 0.999 * spot)
     open = 1.0
     if away[2] > 0.0:
-        if in_the_way(mesh, start, away, NEAR):
+        if wp.mesh_query_ray_anyhit(mesh, start, away, NEAR):
             open = 0.25
     share = 0.5 + 0.5 * away[2]
     around = open * (share * look.sky + (1.0 - share) * look.bounce)

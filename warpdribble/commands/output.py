@@ -56,8 +56,11 @@ def write_outputs(
 ) -> None:
     """Say how it went, write all of it, moved to the middle of the court, and say where. source: where the
     motion comes from; root: what holds the root; cycles: so many of them a policy tried to keep the ball."""
+    from concurrent.futures import ThreadPoolExecutor
+
     from .. import __version__
     from ..sims.trajectory import centred
+    from ..skin import skin as skins
     from ..skin.flesh import is_player
     from ..takes import Take, validate, write_film, write_plots, write_sheet, write_take
     from ..takes.film import frame_count
@@ -79,8 +82,14 @@ def write_outputs(
     picture = command.out.with_suffix(".png")
     plots, replay = command.out.with_suffix(".plots.png"), command.out.with_suffix(".html")
     title = f"{source}, root {root}"
-    write_take(command.out, take, skin=skin, joints=command.usd_joints)
-    write_sheet(picture, take, heights, tracking.contacts, title, skin)
+    if skin:
+        skins.of(model)  # made once, for both threads
+    with ThreadPoolExecutor(1) as beside:  # rays are cast outside Python, while the take is written
+        drawn = beside.submit(write_sheet, picture, take, heights, tracking.contacts, title, skin)
+        write_take(command.out, take, skin=skin, joints=command.usd_joints)
+        if command.html:
+            write_replay(replay, take, tracking.contacts, title, skin=skin)
+        drawn.result()
     write_plots(
         plots,
         take.fps,
@@ -91,8 +100,6 @@ def write_outputs(
         tracking.fallen,
         title,
     )
-    if command.html:
-        write_replay(replay, take, tracking.contacts, title, skin=skin)
     errors = validate(command.out)
     state = "valid USD" if not errors else f"USD validation: {'; '.join(errors)}"
     for lost in left_out(model, command.usd_joints):

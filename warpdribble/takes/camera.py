@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..sims.planar import heading
-from ..sims.signals import low_pass
 from ..skin.meshes import shape_mesh
 from . import figure
 
@@ -85,7 +85,8 @@ def _smooth(way: np.ndarray, fps: float) -> np.ndarray:
     the filter neither begins nor ends at rest."""
     more = min(len(way) - 1, round(fps / STEADY))
     longer = np.pad(way, ((more, more), (0, 0)), mode="reflect", reflect_type="odd")
-    return low_pass(longer, fps, STEADY)[more : more + len(way)]
+    spread = np.sqrt(2.0 * np.log(2.0)) / (2.0 * np.pi * STEADY) * fps
+    return np.asarray(gaussian_filter1d(longer, spread, axis=0)[more : more + len(way)])
 
 
 def _toward(back: np.ndarray) -> Rotation:
