@@ -99,9 +99,8 @@ class Mapping:
                 if key not in there:
                     what = "joint" if table in ("arms", "legs") else "body"
                     who = "palms has" if table == "supinated" else "the model has"
-                    raise MappingError(
-                        f"{self.name}: {table}.{key}: {who} no {what} '{key}'; it has {', '.join(there) or 'none'}"
-                    )
+                    has = ", ".join(there) or "none"
+                    raise MappingError(f"{self.name}: {table}.{key}: {who} no {what} '{key}'; it has {has}")
         for hand in self.palms:
             if (hand, 3) not in [(h, len(k)) for h, k in zip(model.roles.hands, model.roles.knuckles)]:
                 reason = f"{model.path} does not say which bodies are its knuckles, or that it is a hand"
