@@ -27,6 +27,8 @@ STEADY = 0.5
 """[Hz] The camera takes no part in what moves faster: steps, sway, the ball's rhythm."""
 MOST = 0.95
 """Share of the time for which the frame is wide enough, where a player stands up or crouches."""
+SIDES = 0.9
+"""Share of a picture's width that a player may take up, who is wider than tall."""
 EVERY = 3
 """Of a shape's points one in so many is looked at."""
 LOOKS = 40
@@ -50,10 +52,15 @@ def add(stage: Usd.Stage, take: Take, edit: dict[str, Usd.EditTarget], places: n
 
 
 def following(
-    take: Take, player: list[int], back: tuple[float, float, float] = BACK, fills: float = FILLS
+    take: Take,
+    player: list[int],
+    back: tuple[float, float, float] = BACK,
+    fills: float = FILLS,
+    aspect: float = WIDTH / HEIGHT,
 ) -> tuple[np.ndarray, float]:
     """Poses (frames, 7) of a camera that goes along with the player's bodies, without their haste, and how
-    far [m] it stays away. back, fills: as BACK and FILLS."""
+    far [m] it stays away. back, fills: as BACK and FILLS; who is wider than tall is seen from
+    farther away. aspect: of the picture, its width by its height."""
     body_q = np.asarray(take.worlds[0], float)
     way = _smooth(body_q[:, player[0], :2], take.fps)
     turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(back))
@@ -65,8 +72,10 @@ def following(
     seen = (points - [0.0, 0.0, middle]) @ turn.as_matrix()
     distance = 4.0
     for _ in range(6):
-        rows = seen[..., 1] / np.maximum(distance - seen[..., 2], 0.1)
-        distance *= taller * float(np.median(np.ptp(rows, axis=1))) * FOCAL / HEIGHT / fills
+        columns, rows, _ = np.moveaxis(seen / np.maximum(distance - seen[..., 2:], 0.1), -1, 0)
+        high = taller * float(np.median(np.ptp(rows, axis=1)))
+        wide = float(np.quantile(2.0 * np.abs(columns).max(axis=1), MOST))
+        distance *= max(high / fills, wide / (aspect * max(fills, SIDES))) * FOCAL / HEIGHT
     eyes = np.concatenate([way, np.full((len(way), 1), middle)], axis=1) + distance * turn.as_matrix()[:, 2]
     return np.concatenate([eyes, np.tile(turn.as_quat(), (len(eyes), 1))], axis=1), distance
 

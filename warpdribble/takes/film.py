@@ -74,7 +74,7 @@ class Camera:
         self._corners: Any = wp.array(self._faces.astype(np.int32).ravel(), dtype=int, device=device)
         self._out = wp.zeros(size[::-1], dtype=wp.vec3, device=device)
         player = [b for b, name in enumerate(take.body_names) if name != take.ball]
-        self._poses, _ = camera.following(take, player, back, fills)
+        self._poses, _ = camera.following(take, player, back, fills, size[0] / size[1])
 
     def _points(self, frame: int) -> np.ndarray:
         return np.concatenate([part.posed(self.take.worlds[0, frame]) for part in self._parts])
