@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Arrays
+from ..arrays import Arrays, above, below
 from .cycles import Window
 from .newton import Newton
 from .smc import Smc
@@ -22,10 +22,13 @@ SOME = 20
 
 class Usual:
     """Learns as `newton` does; once its first cycle is loose, or no step leads on before there are SOME, as
-    the walk that `then` makes, from the beginning."""
+    the walk that `then` makes, from the beginning. The longer of both trajectories counts."""
 
     def __init__(self, newton: Newton, then: Callable[[], Smc]):
         self.then, self.before, self.iteration = then, 0, 0
+        self.windows = len(newton.windows)
+        self.steps: Arrays | None = None
+        """what steps found before the walk"""
         self.now: Newton | Smc = newton
         self.fingers: list[float] = []
 
@@ -61,7 +64,7 @@ class Usual:
         first = len(self.fingers) == len(now.windows)
         lost = now.stuck and len(self.fingers) <= SOME * len(now.windows)
         if lost or (first and not float(np.mean(self.fingers)) <= LOOSE):
-            self.before, self.now = len(self.fingers), self.then()
+            self.before, self.steps, self.now = len(self.fingers), now.result, self.then()
             report = replace(report, iteration=self.before, fresh=False)
         self.iteration = report.iteration
         return report
@@ -73,7 +76,7 @@ class Usual:
             self.iteration,
             report.fresh,
             found=int(now.lost == 0),
-            cycles=report.cycles,
+            cycles=max(report.cycles, int(np.isfinite(self.fingers).sum()) // self.windows),
             fingers=report.fingers,
             offsets=report.offsets,
             rounds=1,
@@ -83,17 +86,20 @@ class Usual:
 
     @property
     def result(self) -> Arrays | None:
-        return self.now.result
+        now, steps = self.now.result, self.steps
+        return steps if now is None or (steps is not None and len(steps["k"]) > len(now["k"])) else now
 
     @property
     def state(self) -> Arrays:
         walks = isinstance(self.now, Smc)
         own = {"walks": walks, "before": self.before, "fingers": self.fingers}
-        return self.now.state | {f"usual.{name}": np.array(value) for name, value in own.items()}
+        numbers = {name: np.array(value) for name, value in own.items()}
+        return self.now.state | above(usual=numbers, steps=self.steps or {})
 
     def restore(self, state: Arrays) -> None:
         self.before, self.fingers = int(state["usual.before"]), list(state["usual.fingers"])
         if state["usual.walks"]:
-            self.now = self.then()
-        self.now.restore({name: value for name, value in state.items() if not name.startswith("usual.")})
+            self.now, self.steps = self.then(), below("steps", state) or None
+        own = ("usual.", "steps.")
+        self.now.restore({name: value for name, value in state.items() if not name.startswith(own)})
         self.iteration = self.before + self.now.iteration

@@ -33,6 +33,10 @@ class Steps:
         return Window(self.iteration, self.done, int(not self.stuck), 0, off, 0.2, 1, 1.0, 0.5)
 
     @property
+    def result(self):
+        return {"k": np.zeros(len(self.found)), "by": "steps"} if self.found else None
+
+    @property
     def state(self):
         return {"steps": np.array(self.iteration)}
 
@@ -47,6 +51,7 @@ class Walk(Smc):
         self.iteration, self.lost = 0, 0
 
     done = property(lambda self: self.iteration == 3)
+    result = property(lambda self: {"k": np.zeros(2 * self.iteration), "by": "walk"})
     state = property(lambda self: {"walk": np.array(self.iteration)})
 
     def restore(self, state):
@@ -87,6 +92,23 @@ def test_steps_that_do_not_give_way_to_the_walk(fingers):
 def test_what_was_found_before_is_kept_by_steps_that_get_stuck():
     learner, reports = learned([1.0] * 2 * SOME + [np.nan])
     assert isinstance(learner.now, Steps) and reports[-1].found == 0
+
+
+@pytest.mark.parametrize(("cycles", "by"), [(2, "walk"), (4, "steps")])
+def test_the_longer_of_both_counts(cycles, by):
+    """The walk's has three cycles."""
+    learner, reports = learned([1.0] * 2 * cycles + [np.nan])
+    assert learner.result["by"] == by and reports[-1].cycles == max(3, cycles)
+
+
+def test_what_steps_found_is_there_again_beside_the_walk():
+    learner = Usual(Steps([1.0] * 6 + [np.nan]), Walk)
+    while not isinstance(learner.now, Walk):
+        learner.iterate()
+    learner.iterate()
+    other = Usual(Steps([np.nan]), Walk)
+    other.restore(learner.state)
+    assert other.result["by"] == learner.result["by"] == "steps" and len(other.result["k"]) == 6
 
 
 def test_it_goes_on_as_what_it_was():
