@@ -224,10 +224,10 @@ class Smc:
 
     def _learn(self, rows: Rows, count: int | None = None) -> None:
         """M-step, with the first `count` of rows; of a lost walk those whose descendants lived on for half of
-        the lag."""
+        the lag, or of the walk, where that is shorter."""
         c, task = self.config, self.task
         lost = count is None
-        lag = c.lag // 2 if lost else c.lag
+        lag = min(c.lag, len(rows)) // 2 if lost else c.lag
         count = max(0, len(rows) - lag) if count is None else count
         if not count:
             return

@@ -1,5 +1,7 @@
 """One long walk that learns: what it finds plays back exactly, and it goes on from a file to the bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from warpdribble.learning.ball.optimised import Optimised, observed, played, sta
 from warpdribble.learning.ball.smc import Smc, SmcConfig
 from warpdribble.learning.methods.ball import ball_in_hand
 from warpdribble.learning.methods.linear import regressed
-from warpdribble.learning.tasks.arms import Arms
+from warpdribble.learning.tasks.arms import Arms, BallWeights
 from warpdribble.skills import read_skill, skill_graph
 
 SMALL = SmcConfig()
@@ -72,6 +74,19 @@ def test_it_goes_on_from_its_state_to_the_bit(made):
         assert repr(one.iterate().cost) == repr(other.iterate().cost)
     for name, value in one.state.items():
         np.testing.assert_array_equal(other.state[name], value, err_msg=name)
+
+
+def test_walks_that_are_lost_soon_teach_as_well(full, made):
+    """Where a ball is lost a hand's breadth off its reference, every walk ends before half of the lag."""
+    shipped = made(1)
+    task = Arms(full, shipped.graph, SMALL.particles, shipped.legs, weights=BallWeights(lost=0.1))
+    config = replace(SMALL, lag=32)
+    one = Smc(task, config, cycles=1, tries=1, start=ball_in_hand(task.model, task.graph), seed=0)
+    fragments, walk = [], one._walk
+    one._walk = lambda: (fragments.append(walk()), fragments[-1])[1]
+    one.iterate()
+    assert 2 <= len(fragments[0][0]) <= config.lag // 2
+    assert one.policy.a_hat.any()
 
 
 def test_a_state_of_another_task_is_refused(walk, made):
