@@ -64,7 +64,8 @@ class Usual:
         first = len(self.fingers) == len(now.windows)
         lost = now.stuck and len(self.fingers) <= SOME * len(now.windows)
         if lost or (first and not float(np.mean(self.fingers)) <= LOOSE):
-            self.before, self.steps, self.now = len(self.fingers), now.result, self.then()
+            self.steps = now.result if self._whole else None
+            self.before, self.now = len(self.fingers), self.then()
             report = replace(report, iteration=self.before, fresh=False)
         self.iteration = report.iteration
         return report
@@ -76,13 +77,18 @@ class Usual:
             self.iteration,
             report.fresh,
             found=int(now.lost == 0),
-            cycles=max(report.cycles, int(np.isfinite(self.fingers).sum()) // self.windows),
+            cycles=max(report.cycles, self._whole),
             fingers=report.fingers,
             offsets=report.offsets,
             rounds=1,
             samples_per_second=report.samples_per_second,
             outside=report.outside,
         )
+
+    @property
+    def _whole(self) -> int:
+        """Cycles that steps found."""
+        return int(np.isfinite(self.fingers).sum()) // self.windows
 
     @property
     def result(self) -> Arrays | None:

@@ -101,6 +101,12 @@ def test_the_longer_of_both_counts(cycles, by):
     assert learner.result["by"] == by and reports[-1].cycles == max(3, cycles)
 
 
+def test_a_part_of_a_cycle_is_nothing_to_start_from():
+    learner = Usual(Steps([1.0, np.nan]), Walk)
+    learner.iterate(), learner.iterate()
+    assert isinstance(learner.now, Walk) and learner.steps is None
+
+
 def test_what_steps_found_is_there_again_beside_the_walk():
     learner = Usual(Steps([1.0] * 6 + [np.nan]), Walk)
     while not isinstance(learner.now, Walk):
