@@ -59,8 +59,8 @@ def following(
     aspect: float = WIDTH / HEIGHT,
 ) -> tuple[np.ndarray, float]:
     """Poses (frames, 7) of a camera that goes along with the player's bodies, without their haste, and how
-    far [m] it stays away. back, fills: as BACK and FILLS; who is wider than tall is seen from
-    farther away. aspect: of the picture, its width by its height."""
+    far [m] it stays away. back, fills: as BACK and FILLS; farther for who is wider than tall. aspect: of the
+    picture, its width by its height."""
     body_q = np.asarray(take.worlds[0], float)
     way = _smooth(body_q[:, player[0], :2], take.fps)
     turn = _toward(Rotation.from_rotvec([0.0, 0.0, heading(body_q[0, player[0], 3:])]).apply(back))
@@ -75,7 +75,7 @@ def following(
         columns, rows, _ = np.moveaxis(seen / np.maximum(distance - seen[..., 2:], 0.1), -1, 0)
         high = taller * float(np.median(np.ptp(rows, axis=1)))
         wide = float(np.quantile(2.0 * np.abs(columns).max(axis=1), MOST))
-        distance *= max(high / fills, wide / (aspect * max(fills, SIDES))) * FOCAL / HEIGHT
+        distance *= max(high / fills, wide / (aspect * SIDES)) * FOCAL / HEIGHT
     eyes = np.concatenate([way, np.full((len(way), 1), middle)], axis=1) + distance * turn.as_matrix()[:, 2]
     return np.concatenate([eyes, np.tile(turn.as_quat(), (len(eyes), 1))], axis=1), distance
 
@@ -94,7 +94,7 @@ def _smooth(way: np.ndarray, fps: float) -> np.ndarray:
     the filter neither begins nor ends at rest."""
     more = min(len(way) - 1, round(fps / STEADY))
     longer = np.pad(way, ((more, more), (0, 0)), mode="reflect", reflect_type="odd")
-    spread = np.sqrt(2.0 * np.log(2.0)) / (2.0 * np.pi * STEADY) * fps
+    spread = np.sqrt(2.0 * np.log(2.0)) / (2.0 * np.pi * STEADY) * fps  # half of what moves at STEADY is left
     return np.asarray(gaussian_filter1d(longer, spread, axis=0)[more : more + len(way)])
 
 

@@ -113,18 +113,18 @@ def own(places, name):
 def test_a_recorded_ball_is_used_and_said(simulated, tmp_path, mocap, player):
     """By both, to the bit; it starts where it was recorded, and not where the hand would have it."""
     path = mocap / "ballplay_m" / RUN
-    said, places = simulated(path, "--frames", 0, 80)
-    skill, others = simulated(skill_file(tmp_path, path, (0, 80)))
+    said, places = simulated(path, "--frames", 38, 80)
+    skill, others = simulated(skill_file(tmp_path, path, (38, 80)))
     assert_same_places(places, others)
     assert "ball recorded" in notes(said) and notes(said) == notes(skill)
-    one = stage_skill(player, clip_skill(path, (0, 80)))
+    one = stage_skill(player, clip_skill(path, (38, 80)))
     assert one.ball.recorded
     begins = own(places, "Ball")[0]
     recorded, guessed = (
         ball.path[0] - one.reference.joint_q[0, :3]
         for ball in (one.ball, inferred_ball(player, one.reference))
     )
-    assert np.linalg.norm(begins - recorded) < 0.022 < 0.06 < np.linalg.norm(begins - guessed)
+    assert np.linalg.norm(begins - recorded) < 0.022 < 0.1 < np.linalg.norm(begins - guessed)
 
 
 def test_without_the_ball_there_is_none(simulated, mocap):
