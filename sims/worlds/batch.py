@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import platform
 import threading
 from collections.abc import Callable, Iterator
@@ -74,12 +75,25 @@ def telling(compiles: Callable[[], object]) -> Iterator[None]:
         _TOLD.remove(compiles)
 
 
+COMPILED = ("place", "probe", "step", "observe")
+"""Kernel modules that share functions, in the order in which they are loaded."""
+
+
+def _name(program: ModuleType, device: wp.Device) -> None:
+    """Have Warp hash the kernels that share functions with a program before it compiles that: it hashes what
+    compiling changes, and the next process would find none of the others in its cache."""
+    package = program.__name__.rpartition(".")[0]
+    for name in COMPILED:
+        cached(importlib.import_module(f"{package}.{name}"), device)
+
+
 def _load(program: ModuleType, device: wp.Device) -> None:
     """Compile and load kernels, once in a process: to load them again would take away the code that another
     thread may be running."""
     with _LOADING:
         if (program, device.alias) not in _LOADED:
-            if _TOLD and not cached(program, device):
+            if not cached(program, device):
+                _name(program, device)
                 for compiles in _TOLD:
                     compiles()
             program.load(device)
