@@ -3,6 +3,7 @@
 import warp as wp
 
 from .aim import Course, aim
+from .loading import compiled
 from .mean import even_out
 from .step import OPTIONS, finish, start
 from .tree import Tree, World
@@ -14,7 +15,7 @@ wp.set_module_options(OPTIONS)
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 @wp.kernel

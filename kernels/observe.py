@@ -8,6 +8,7 @@ import warp as wp
 
 from .collide import probe
 from .kinematics import inertias, joint_dofs, kinematics
+from .loading import compiled
 from .port import give
 from .spatial import *
 from .tree import BALL, GROUND, HINGE, Tree, World
@@ -19,7 +20,7 @@ wp.set_module_options(
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 @wp.kernel

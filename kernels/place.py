@@ -3,6 +3,7 @@
 import warp as wp
 
 from .lanes import *
+from .loading import compiled
 from .tree import Tree, World
 
 wp.set_module_options(
@@ -12,7 +13,7 @@ wp.set_module_options(
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 @wp.struct

@@ -7,6 +7,7 @@ device. The unused worlds of the last group read what the last world does, and w
 import warp as wp
 
 from .lanes import *
+from .loading import compiled
 from .tree import Tree, World
 
 wp.set_module_options(
@@ -16,7 +17,7 @@ wp.set_module_options(
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 def _each_lane(address: str, give: str) -> str:

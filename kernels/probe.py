@@ -9,6 +9,7 @@ import warp as wp
 
 from .bounce import BOUNCE_SPEED
 from .kinematics import kinematics, load3, load4, own_inertia
+from .loading import compiled
 from .port import choose, give, take
 from .spatial import *
 from .tree import HINGE, Tree, World
@@ -21,7 +22,7 @@ wp.set_module_options(
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 # kinds of terms, and how many numbers they have

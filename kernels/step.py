@@ -11,6 +11,7 @@ from .contact import HEAD, drop_impulses, find  # noqa: F401
 from .drive import TRIALS
 from .integrate import integrate
 from .kinematics import inertias, kinematics
+from .loading import compiled
 from .settle import residual
 from .solve import keep, solve
 from .spatial import *
@@ -29,7 +30,7 @@ wp.set_module_options(OPTIONS)
 
 def load(device) -> None:
     """Compile the kernels now; to be done before threads launch them."""
-    wp.load_module(__name__, device=device)
+    compiled(__name__, device)
 
 
 @wp.func

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import platform
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ import numpy as np
 import warp as wp
 
 from ... import kernels
+from ...kernels import loading
 from ..model import Model
 from .cores import usable_cores
 from .state import QUANTITIES, Block, Layout
@@ -59,9 +59,7 @@ _TOLD: list[Callable[[], object]] = []
 
 def cached(program: ModuleType, device: wp.Device) -> bool:
     """Whether kernels lie compiled in Warp's cache, so that loading them takes no compiler."""
-    block = 1 if device.is_cpu else None  # as Warp launches on each
-    name = wp.get_module(program.__name__).get_module_identifier(block)
-    return any(Path(str(wp.config.kernel_cache_dir), name).glob("*.o" if device.is_cpu else "*.sm*"))
+    return loading.cached(program.__name__, device)
 
 
 @contextlib.contextmanager
@@ -75,25 +73,12 @@ def telling(compiles: Callable[[], object]) -> Iterator[None]:
         _TOLD.remove(compiles)
 
 
-COMPILED = ("place", "probe", "step", "observe")
-"""Kernel modules that share functions, in the order in which they are loaded."""
-
-
-def _name(program: ModuleType, device: wp.Device) -> None:
-    """Have Warp hash the kernels that share functions with a program before it compiles that: it hashes what
-    compiling changes, and the next process would find none of the others in its cache."""
-    package = program.__name__.rpartition(".")[0]
-    for name in COMPILED:
-        cached(importlib.import_module(f"{package}.{name}"), device)
-
-
 def _load(program: ModuleType, device: wp.Device) -> None:
     """Compile and load kernels, once in a process: to load them again would take away the code that another
     thread may be running."""
     with _LOADING:
         if (program, device.alias) not in _LOADED:
-            if not cached(program, device):
-                _name(program, device)
+            if _TOLD and not cached(program, device):
                 for compiles in _TOLD:
                     compiles()
             program.load(device)
