@@ -20,6 +20,7 @@ from ..sims.ball.ball import (
     recorded_ball,
 )
 from ..sims.ball.hands import find_hands
+from ..sims.ball.lead import led
 from ..sims.errors import InputError
 from ..sims.model import Model
 from ..sims.reference.mirror import mirrored
@@ -97,6 +98,11 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
             cycle = closed(model, reference)
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
+            found = None if ball.recorded else led(model, cycle, ball)
+            if found is not None:
+                cycle, ball, note = found
+                ball = replace(ball, heights=skill.heights or ball.heights)
+                notes.append(note)
         reference = cycle.reference
         if cycle.gap:
             notes.append(f"its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")

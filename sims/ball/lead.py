@@ -1,0 +1,150 @@
+"""Hands led to a ball that moves as balls do.
+
+A ball that is told from the hands' motion alone is where their palms are, and no palm can pull. Where a
+recorded hand would have to (wrists that markers do not show, a person of another size, a release that is a
+few hundredths of a second off), no controller can follow both. So the ball's way is found first (`chain`),
+and the arms are solved for palms that lie on it and face the way in which they push.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
+
+from ..model import Model, pose
+from ..reference.reference import Cycle
+from ..retarget.reach import reach
+from ..signals import smoothstep
+from .ball import Ball
+from .chain import Carried, Chain, holds_of
+from .hands import Hands, find_hands
+
+EARLY = 0.04
+"""[s] before it is told does a hand let go of the ball: by then it is slow, and the arm nearly straight."""
+RESTITUTION = 0.75
+"""[-] on which the ball's way counts. The simulated one's is higher: what comes higher than the hand can be
+pushed down, of what comes lower nothing can be made."""
+EASE = 0.14
+"""[s] before and after it has the ball in which a hand comes from where it was recorded, and goes back."""
+BRAKE = 0.05
+"""[s] in which it loses the speed that it has more than the recorded one."""
+SMOOTH = 0.03
+"""[s] over which a palm's turn is smoothed."""
+BENT, STRETCHED = 0.95, 0.985
+"""[-] of its length to which an arm is stretched easily, and at most; the elbow of a straight one snaps."""
+SLIGHT, TURNED = 0.02, 0.2
+"""[m], [rad] Hands that are so near to where they would be led stay as they are."""
+
+
+def led(
+    model: Model, cycle: Cycle, ball: Ball, early: float = EARLY, restitution: float = RESTITUTION
+) -> tuple[Cycle, Ball, str] | None:
+    """The cycle with its hands led to the ball, that ball, and a note on it; None where hands are right as
+    they are, both have the ball at once, or no ball moves so. early: [s] by which a hand lets go before it is
+    told to."""
+    hands = find_hands(model, cycle.repeat(model, 3))
+    count = cycle.reference.frame_count - 1
+    ball = _let_go_early(ball, round(early / hands.timestep), count)
+    flights = sorted(ball.flights, key=lambda way: way.release)
+    holds = holds_of(hands, flights, count)
+    found = Chain(model, cycle, hands, flights, holds, restitution).solve() if holds else None
+    if found is None:
+        return None
+    flown, carried = found
+    moved, turned = (
+        max(float(np.linalg.norm(vectors, axis=1).max()) for vectors in each)
+        for each in ([one.shift for one in carried], [one.turn for one in carried])
+    )
+    if moved < SLIGHT and turned < TURNED:
+        return None
+    path = np.empty((count + 1, 3))
+    shift, turn = np.zeros((2, count + 1, 2, 3))
+    ease = 0.5 * min(len(way.path) for way in flown) * hands.timestep
+    for way, one in zip(flown, carried):
+        flies = np.arange(way.way.release - 1, way.way.catch + 1) + count
+        for rows, places in ((flies, way.path), (one.hold.rows, one.path)):
+            for cycles in np.unique(rows // count):
+                now = rows // count == cycles
+                path[rows[now] % count] = _back(model, cycle, places[now], int(cycles))
+        for rows, *vectors in _eased(one, hands, min(EASE, ease)):
+            for out, own in zip((shift, turn), vectors):
+                back = _turned(own, -cycle.turn * (rows // count))
+                np.add.at(out[:, one.hold.hand], rows % count, back)
+    path[-1] = cycle.ahead(model, path[:1])[0]
+    for out in (shift, turn):
+        out[-1] = _turned(out[0], np.full(2, cycle.turn))
+    joint_q = cycle.reference.joint_q.copy()
+    place_hands(model, joint_q, shift, turn)
+    heights = tuple(float(path[row, 2]) for row in ball.checkpoints)
+    by = f"{100 * moved:.0f} cm and {np.degrees(turned):.0f} degrees"
+    note = f"hands led to a ball that can be pushed so, by up to {by}"
+    reference = replace(cycle.reference, joint_q=joint_q)
+    return replace(cycle, reference=reference), replace(ball, path=path, heights=heights), note
+
+
+def _let_go_early(ball: Ball, rows: int, count: int) -> Ball:
+    """The same with every flight of the cycle of `count` rows begun so many rows before."""
+    flights, touch = [], ball.touch.copy()
+    for way in ball.flights:
+        release = way.release - rows
+        touch[np.arange(release, way.release) % count, way.hand] = False
+        later = count if release < 0 else 0
+        flights.append(replace(way, release=release + later, catch=way.catch + later))
+    touch[-1] = touch[0]
+    return replace(ball, touch=touch, flights=tuple(flights))
+
+
+def place_hands(model: Model, joint_q: np.ndarray, shift: np.ndarray, turn: np.ndarray) -> None:
+    """Solve the arms of joint_q (frames, nq), in place, for hands moved by `shift` (frames, 2, 3) [m],
+    with a ball on each, and turned about that ball by `turn` (frames, 2, 3) [rad]."""
+    for hand, (palm, elbow) in enumerate(zip(model.roles.both("palms"), model.roles.elbows)):
+        if not (shift[:, hand].any() or turn[:, hand].any()):
+            continue
+        body, place, facing = model.sites[palm]
+        before = pose.forward(model, joint_q, [body])[:, body]
+        was = Rotation.from_quat(before[:, 3:])
+        arm = np.asarray(place) + model.ball_radius * Rotation.from_quat(facing).apply([0.0, 0.0, 1.0])
+        centre = before[:, :3] + was.apply(arm) + shift[:, hand]
+        now = Rotation.from_rotvec(turn[:, hand]) * was
+        reach(model, joint_q, elbow, _within_reach(model, joint_q, elbow, centre - now.apply(arm)), now)
+
+
+def _within_reach(model: Model, joint_q: np.ndarray, elbow: str, wrist: np.ndarray) -> np.ndarray:
+    """Places (frames, 3) [m] for a wrist, those that would stretch the arm brought nearer to the shoulder."""
+    upper = pose.limb_bodies(model, elbow)[0]
+    shoulder = pose.forward(model, joint_q, [upper])[:, upper, :3]
+    away = np.linalg.norm(wrist - shoulder, axis=1, keepdims=True)
+    arm = pose.limb(model, elbow)
+    share = away / (np.linalg.norm(arm.upper) + np.linalg.norm(arm.lower))
+    room = STRETCHED - BENT
+    near = np.where(share > BENT, BENT + room * np.tanh((share - BENT) / room), share)
+    return shoulder + (wrist - shoulder) * near / share
+
+
+def _eased(one: Carried, hands: Hands, ease: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Rows, offsets [m] and turns [rad] of a hand while it has the ball, and `ease` [s] after and before."""
+    step, rows = hands.timestep, one.hold.rows
+    shift, turn = one.shift, gaussian_filter1d(one.turn, SMOOTH / step, axis=0, mode="nearest")
+    faster, out = one.velocity - hands.velocity[rows, one.hold.hand], [(rows, shift, turn)]
+    since = np.arange(1, round(ease / step))
+    times = since[:, None] * step
+    share, braked = smoothstep(1.0 - times / ease), times * np.maximum(1.0 - times / BRAKE, 0.0) ** 2
+    for sign, end in ((1, -1), (-1, 0)):
+        back = share * shift[end] + braked * sign * faster[end]
+        out.append((rows[end] + sign * since, back, share * turn[end]))
+    return out
+
+
+def _back(model: Model, cycle: Cycle, points: np.ndarray, cycles: int) -> np.ndarray:
+    """Points (n, 3) [m] so many cycles before."""
+    for _ in range(abs(cycles)):
+        points = cycle.behind(model, points) if cycles > 0 else cycle.ahead(model, points)
+    return points
+
+
+def _turned(vectors: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Vectors (n, 3) turned about the vertical by angles (n,) [rad]."""
+    return Rotation.from_euler("z", np.asarray(angles, float)[:, None]).apply(vectors)
