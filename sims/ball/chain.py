@@ -3,9 +3,9 @@ it.
 
 Flights are what gravity and the ground make of how a ball leaves a hand. In a hand it may be accelerated as
 one likes, but for what that asks of a palm: a force the way it faces, within the friction of skin on leather.
-Each hold begins as a flight ends, and ends as the next begins, the last as the first of the next cycle. Among
-all ways that fit together, the one is taken that is least off the hands, asks them least to pull, and is
-pushed most evenly: nonlinear least squares, linear but for the flights.
+Each hold begins as a flight ends, and ends as the next begins, in a cycle the last as the first of the next
+one. Among all ways that fit together, the one is taken that is least off the hands, asks them least to pull,
+and is pushed most evenly: nonlinear least squares, linear but for the flights.
 """
 
 from __future__ import annotations
@@ -50,8 +50,16 @@ class Hold:
     [m/s^2] at k moments."""
 
     hand: int
+    comes: int | None
+    """The flight that it begins with; None: it begins with the recorded hand."""
+    leaves: int | None
+    """The flight that it ends with, None for none,"""
+    later: bool
+    """and whether that is the one of the next cycle."""
     rows: np.ndarray
     """(n,)"""
+    begins: np.ndarray
+    """(2, 3) place [m] and velocity [m/s] of the recorded hand in the first"""
     centre: np.ndarray
     """(n, 3) [m] where the recorded hand has it"""
     normal: np.ndarray
@@ -66,7 +74,17 @@ class Hold:
     """(k - 1, m) ... and by how much that changes [g]."""
 
     @classmethod
-    def of(cls, hands: Hands, hand: int, first: int, stop: int) -> Hold:
+    def of(
+        cls,
+        hands: Hands,
+        hand: int,
+        span: tuple[int, int],
+        comes: int | None,
+        leaves: int | None,
+        later: bool = False,
+    ) -> Hold:
+        """Between two flights or none, of rows first to stop - 1."""
+        first, stop = span
         rows, step = np.arange(first, stop), hands.timestep
         times = (rows - first) * step
         knots = np.linspace(0.0, times[-1], max(4, round(times[-1] / KNOTS) + 1))
@@ -76,7 +94,11 @@ class Hold:
         change = np.diff(np.eye(len(knots)), 2, axis=0) / GRAVITY
         return cls(
             hand,
+            comes,
+            leaves,
+            later,
             rows,
+            np.stack([hands.centre[first, hand], hands.velocity[first, hand]]),
             hands.centre[rows, hand],
             hands.normal[rows, hand],
             np.hstack([one, times[:, None], _summed(faster, step)]),
@@ -184,106 +206,169 @@ class Carried:
         )
 
 
-class Chain:
-    """The flights and holds of one cycle, each of which begins as the one before ends; numbers x of a flight
-    are its place [m] and velocity [m/s], those of a hold its accelerations [10 m/s^2]."""
+@dataclass(frozen=True)
+class Anchor:
+    """Where a flight should begin or end that no single hand begins or ends."""
 
-    def __init__(
-        self,
-        model: Model,
-        cycle: Cycle,
-        hands: Hands,
-        flights: list[Flight],
-        holds: list[Hold],
-        restitution: float = BOUNCE,
-    ):
-        self.hands, self.flights, self.holds, self.restitution = hands, flights, holds, restitution
-        count, number = cycle.reference.frame_count - 1, len(flights)
-        sizes = [6] * number + [3 * (hold.way.shape[1] - 2) for hold in holds]
+    flight: int
+    ends: bool
+    goal: np.ndarray
+    """(3,) [m]"""
+
+
+@dataclass(frozen=True)
+class Links:
+    """What a ball does in a clip or cycle, in rows of its hands."""
+
+    flights: list[Flight]
+    holds: list[Hold]
+    anchors: list[Anchor]
+    onward: tuple[np.ndarray, np.ndarray] = (np.eye(3), np.zeros(3))
+    """(3, 3), (3,) [m] what turns and moves a cycle's places to where they are in the next"""
+
+
+class Chain:
+    """Flights and holds, each of which begins as the one before ends; numbers x of a flight are its place [m]
+    and velocity [m/s], those of a hold its accelerations [10 m/s^2]."""
+
+    def __init__(self, hands: Hands, links: Links, restitution: float = BOUNCE):
+        self.hands, self.links, self.restitution = hands, links, restitution
+        sizes = [6] * len(links.flights) + [3 * (hold.way.shape[1] - 2) for hold in links.holds]
         ends = np.cumsum([0, *sizes])
         self.parts = [slice(a, b) for a, b in pairwise(ends.tolist())]
         start = []
-        for way in flights:
-            row, lasts = way.release - 1 + count, (way.catch - way.release + 1) * hands.timestep
-            place, end = hands.centre[row, way.hand], hands.centre[way.catch + count, way.next_hand]
+        for way in links.flights:
+            lasts = (way.catch - way.release + 1) * hands.timestep
+            place, end = hands.centre[way.release - 1, way.hand], hands.centre[way.catch, way.next_hand]
             speed = float(np.nan_to_num(speed_to_meet(place[2], end[2], lasts, hands.radius), nan=3.0))
             start.append(np.array([*place, *(end - place)[:2] / lasts, -speed]))
-        for hold in holds:
+        for hold in links.holds:
             ridge = 1e-3 * np.eye(hold.way.shape[1])
             goal = np.vstack([hold.centre, 0.0 * ridge[:, :3]])
             start.append(0.1 * np.linalg.lstsq(np.vstack([hold.way, ridge]), goal, rcond=None)[0][2:].ravel())
         self.start = np.concatenate(start)
-        turn = np.eye(3)
-        turn[:2, :2] = rotation(cycle.turn)
-        self.turn, self.ahead = turn, cycle.ahead(model, np.zeros((1, 3)))[0]
 
     def at(self, x: np.ndarray) -> tuple[list[Flown], list[Carried]]:
         """Flights and holds of numbers x."""
-        pieces, number = [x[part] for part in self.parts], len(self.flights)
+        pieces, number = [x[part] for part in self.parts], len(self.links.flights)
         own = self.hands.radius, self.hands.timestep, self.restitution
-        flown = [Flown(way, p[:3], p[3:], *own) for way, p in zip(self.flights, pieces)]
-        return flown, [
-            Carried(hold, np.vstack([way.arrival, 10.0 * p.reshape(-1, 3)]))
-            for way, hold, p in zip(flown, self.holds, pieces[number:])
-        ]
+        flown = [Flown(way, p[:3], p[3:], *own) for way, p in zip(self.links.flights, pieces)]
+        carried = []
+        for hold, p in zip(self.links.holds, pieces[number:]):
+            begins = hold.begins if hold.comes is None else flown[hold.comes].arrival
+            carried.append(Carried(hold, np.vstack([begins, 10.0 * p.reshape(-1, 3)])))
+        return flown, carried
 
     def gaps(self, flown: list[Flown], carried: list[Carried]) -> np.ndarray:
-        """(flights, 6) [m], [10 m/s] from where each hold ends to where the next flight begins."""
-        return np.array(
-            [
-                np.concatenate([one.path[-1] - place, 0.1 * (one.velocity[-1] - velocity)])
-                for one, (place, velocity) in zip(carried, self._begins(flown))
-            ]
-        )
-
-    def _begins(self, flown: list[Flown]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Places and velocities at which each hold should end: the last in the cycle that follows."""
-        first = flown[0]
-        following = (self.turn @ first.place + self.ahead, self.turn @ first.velocity)
-        return [*((way.place, way.velocity) for way in flown[1:]), following]
+        """(6 n,) [m], [10 m/s] from where each of n holds ends to where the flight after it begins."""
+        out = [np.zeros(0)]
+        for one in carried:
+            if one.hold.leaves is not None:
+                way = flown[one.hold.leaves]
+                turn, move = self.links.onward if one.hold.later else (np.eye(3), np.zeros(3))
+                out.append(one.path[-1] - turn @ way.place - move)
+                out.append(0.1 * (one.velocity[-1] - turn @ way.velocity))
+        return np.concatenate(out)
 
     def off(self, x: np.ndarray) -> np.ndarray:
         """What is least in squares."""
         flown, carried = self.at(x)
-        return np.concatenate([self.gaps(flown, carried).ravel() / CLOSED, *(c.misses()[0] for c in carried)])
+        anchored = [
+            ((flown[a.flight].arrival[0] if a.ends else flown[a.flight].place) - a.goal) / NEAR
+            for a in self.links.anchors
+        ]
+        return np.concatenate(
+            [self.gaps(flown, carried) / CLOSED, *(c.misses()[0] for c in carried), *anchored]
+        )
 
     def slopes(self, x: np.ndarray) -> np.ndarray:
         """Its derivatives by x."""
-        (flown, carried), number = self.at(x), len(self.flights)
-        ends, misses = np.zeros((6 * number, len(x))), []
-        for i, (way, one) in enumerate(zip(flown, carried)):
-            comes = np.zeros((6, 6))
-            for j, small in enumerate(1e-6 * np.eye(6)):
-                near = replace(way, place=way.place + small[:3], velocity=way.velocity + small[3:])
-                comes[:, j] = (near.arrival - way.arrival).ravel() / 1e-6
-            last = (one.hold.way[-1:], 0.1 * one.hold.speed[-1:])
-            by_points = [one.misses()[1], *(np.kron(row, np.eye(3)) for row in last)]
-            out = [np.zeros((len(part), len(x))) for part in by_points]
-            for part, full in zip(by_points, out):
-                full[:, self.parts[i]] = part[:, :6] @ comes
-                full[:, self.parts[number + i]] = 10.0 * part[:, 6:]
-            misses.append(out[0])
-            ends[6 * i : 6 * i + 6] = np.concatenate(out[1:])
-            then, turn = (i + 1) % number, np.eye(3) if i + 1 < number else self.turn
-            ends[6 * i : 6 * i + 6, self.parts[then]] -= np.kron(np.diag([1.0, 0.1]), turn)
-        return np.concatenate([ends / CLOSED, *misses])
+        (flown, carried), number = self.at(x), len(self.links.flights)
+        comes = [_slopes(way) for way in flown]
+        ends, misses, anchored = [np.zeros((0, len(x)))], [], []
+        for j, one in enumerate(carried):
+            last = np.vstack([one.hold.way[-1:], 0.1 * one.hold.speed[-1:]])
+            both = []
+            for part in (one.misses()[1], np.kron(last, np.eye(3))):
+                full = np.zeros((len(part), len(x)))
+                if one.hold.comes is not None:
+                    full[:, self.parts[one.hold.comes]] = part[:, :6] @ comes[one.hold.comes]
+                full[:, self.parts[number + j]] = 10.0 * part[:, 6:]
+                both.append(full)
+            misses.append(both[0])
+            if one.hold.leaves is not None:
+                turn = self.links.onward[0] if one.hold.later else np.eye(3)
+                both[1][:, self.parts[one.hold.leaves]] -= np.kron(np.diag([1.0, 0.1]), turn)
+                ends.append(both[1])
+        for anchor in self.links.anchors:
+            full = np.zeros((3, len(x)))
+            own = comes[anchor.flight][:3] if anchor.ends else np.eye(3, 6)
+            full[:, self.parts[anchor.flight]] = own / NEAR
+            anchored.append(full)
+        return np.concatenate([np.concatenate(ends) / CLOSED, *misses, *anchored])
 
     def solve(self) -> tuple[list[Flown], list[Carried]] | None:
         """The flights and holds that fit together, nearest to the recorded hands; None where none do."""
         fit = least_squares(self.off, self.start, self.slopes, method="lm", ftol=1e-4)
         flown, carried = self.at(fit.x)
-        return (flown, carried) if np.abs(self.gaps(flown, carried)).max() < CLOSED else None
+        return (flown, carried) if np.abs(self.gaps(flown, carried)).max(initial=0.0) < CLOSED else None
 
 
-def holds_of(hands: Hands, flights: list[Flight], count: int) -> list[Hold]:
-    """Of each flight, the hold after it; none where one does not begin with the hand that has the ball."""
-    holds = []
-    for way, following in zip(flights, [*flights[1:], *flights[:1]]):
-        stop = following.release + (count if following is flights[0] else 0)
+def cycle_links(hands: Hands, cycle: Cycle, flights: list[Flight], model: Model) -> Links | None:
+    """Of a cycle's flights, in order, the middle ones of three cycles; None where one does not begin with the
+    hand in which the one before ended."""
+    count, number, holds = cycle.reference.frame_count - 1, len(flights), []
+    for i, (way, following) in enumerate(zip(flights, [*flights[1:], *flights[:1]])):
+        last = i + 1 == number
+        stop = following.release + (count if last else 0)
         if way.next_hand != following.hand or stop - way.catch < SHORTEST or stop > 2 * count:
-            return []
-        holds.append(Hold.of(hands, way.next_hand, way.catch + count, stop + count))
-    return holds
+            return None
+        span = (way.catch + count, stop + count)
+        holds.append(Hold.of(hands, way.next_hand, span, i, (i + 1) % number, last))
+    turn = np.eye(3)
+    turn[:2, :2] = rotation(cycle.turn)
+    own = [replace(way, release=way.release + count, catch=way.catch + count) for way in flights]
+    return Links(own, holds, [], (turn, cycle.ahead(model, np.zeros((1, 3)))[0])) if own else None
+
+
+def clip_links(hands: Hands, touch: np.ndarray, path: np.ndarray, flights: list[Flight]) -> Links | None:
+    """Of a clip's flights, in order, with who has the ball, touch (frames, 2), and its way (frames, 3) [m];
+    None for none. Where both hands have it, it stays where it is."""
+    flights = [way for way in flights if 0 < way.release < way.catch < len(touch)]
+    alone = touch & ~touch[:, ::-1]
+    holds, anchors, led_to = [], [], set()
+    for i, way in enumerate(flights):
+        before = way.release - _length(alone[: way.release, way.hand][::-1])
+        comes = (
+            i - 1 if i and flights[i - 1].catch == before and flights[i - 1].next_hand == way.hand else None
+        )
+        if way.release - before < SHORTEST:
+            anchors.append(Anchor(i, False, path[way.release - 1]))
+        else:
+            holds.append(Hold.of(hands, way.hand, (before, way.release), comes, i))
+            led_to.add(comes)
+    for i, way in enumerate(flights):
+        if i not in led_to:
+            length = _length(alone[way.catch :, way.next_hand])
+            if length < SHORTEST:
+                anchors.append(Anchor(i, True, path[way.catch]))
+            else:
+                holds.append(Hold.of(hands, way.next_hand, (way.catch, way.catch + length), i, None))
+    return Links(flights, holds, anchors) if holds else None
+
+
+def _length(holds: np.ndarray) -> int:
+    """How many of the first values (n,) bool are true without a break."""
+    return int(np.argmin([*holds, False]))
+
+
+def _slopes(way: Flown) -> np.ndarray:
+    """(6, 6) derivatives of a flight's arrival by its place and velocity."""
+    out, near = np.zeros((6, 6)), 1e-6
+    for j, small in enumerate(near * np.eye(6)):
+        moved = replace(way, place=way.place + small[:3], velocity=way.velocity + small[3:])
+        out[:, j] = (moved.arrival - way.arrival).ravel() / near
+    return out
 
 
 def _summed(values: np.ndarray, step: float) -> np.ndarray:

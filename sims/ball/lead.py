@@ -8,18 +8,18 @@ and the arms are solved for palms that lie on it and face the way in which they 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..model import Model, pose
-from ..reference.reference import Cycle
+from ..reference.reference import Cycle, Reference
 from ..retarget.reach import reach
 from ..signals import smoothstep
 from .ball import Ball
-from .chain import Carried, Chain, holds_of
+from .chain import SHORTEST, Carried, Chain, clip_links, cycle_links
 from .hands import Hands, find_hands
 
 EARLY = 0.04
@@ -49,8 +49,62 @@ def led(
     count = cycle.reference.frame_count - 1
     ball = _let_go_early(ball, round(early / hands.timestep), count)
     flights = sorted(ball.flights, key=lambda way: way.release)
-    holds = holds_of(hands, flights, count)
-    found = Chain(model, cycle, hands, flights, holds, restitution).solve() if holds else None
+    links = cycle_links(hands, cycle, flights, model)
+    found = None if links is None else _lead(hands, Chain(hands, links, restitution))
+    if found is None:
+        return None
+    path, shift, turn = np.empty((count + 1, 3)), *np.zeros((2, count + 1, 2, 3))
+    for rows, places in found.path:
+        for cycles in np.unique(rows // count):
+            now = rows // count == cycles
+            path[rows[now] % count] = _back(model, cycle, places[now], int(cycles))
+    for hand, rows, *vectors in found.hands:
+        for out, own in zip((shift, turn), vectors):
+            np.add.at(out[:, hand], rows % count, _turned(own, -cycle.turn * (rows // count)))
+    path[-1] = cycle.ahead(model, path[:1])[0]
+    for out in (shift, turn):
+        out[-1] = _turned(out[0], np.full(2, cycle.turn))
+    joint_q = place_hands(model, cycle.reference.joint_q, shift, turn)
+    reference = replace(cycle.reference, joint_q=joint_q)
+    return replace(cycle, reference=reference), _along(ball, path), found.note
+
+
+def led_once(
+    model: Model, reference: Reference, ball: Ball, early: float = EARLY, restitution: float = RESTITUTION
+) -> tuple[Reference, Ball, str] | None:
+    """The same for what happens once; where both hands have the ball, they stay as they are."""
+    hands, frames = find_hands(model, reference), reference.frame_count
+    ball = _let_go_early(ball, round(early / hands.timestep))
+    flights = sorted(ball.flights, key=lambda way: way.release)
+    links = clip_links(hands, ball.touch, ball.path, flights)
+    found = None if links is None else _lead(hands, Chain(hands, links, restitution))
+    if found is None:
+        return None
+    path, shift, turn = ball.path.copy(), *np.zeros((2, frames, 2, 3))
+    for rows, places in found.path:
+        path[rows] = places
+    for hand, rows, *vectors in found.hands:
+        inside = (rows >= 0) & (rows < frames)
+        for out, own in zip((shift, turn), vectors):
+            np.add.at(out[:, hand], rows[inside], own[inside])
+    joint_q = place_hands(model, reference.joint_q, shift, turn)
+    return replace(reference, joint_q=joint_q), _along(ball, path), found.note
+
+
+@dataclass(frozen=True)
+class Led:
+    """What a chain does to ball and hands."""
+
+    path: list[tuple[np.ndarray, np.ndarray]]
+    """Rows (n,) and places (n, 3) [m] of the ball."""
+    hands: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]
+    """A hand, rows (n,), offsets (n, 3) [m] and turns (n, 3) [rad]."""
+    note: str
+
+
+def _lead(hands: Hands, chain: Chain) -> Led | None:
+    """What leads the hands to a chain's ball; None where they are near enough, or no ball moves so."""
+    found = chain.solve()
     if found is None:
         return None
     flown, carried = found
@@ -60,46 +114,43 @@ def led(
     )
     if moved < SLIGHT and turned < TURNED:
         return None
-    path = np.empty((count + 1, 3))
-    shift, turn = np.zeros((2, count + 1, 2, 3))
-    ease = 0.5 * min(len(way.path) for way in flown) * hands.timestep
-    for way, one in zip(flown, carried):
-        flies = np.arange(way.way.release - 1, way.way.catch + 1) + count
-        for rows, places in ((flies, way.path), (one.hold.rows, one.path)):
-            for cycles in np.unique(rows // count):
-                now = rows // count == cycles
-                path[rows[now] % count] = _back(model, cycle, places[now], int(cycles))
-        for rows, *vectors in _eased(one, hands, min(EASE, ease)):
-            for out, own in zip((shift, turn), vectors):
-                back = _turned(own, -cycle.turn * (rows // count))
-                np.add.at(out[:, one.hold.hand], rows % count, back)
-    path[-1] = cycle.ahead(model, path[:1])[0]
-    for out in (shift, turn):
-        out[-1] = _turned(out[0], np.full(2, cycle.turn))
-    joint_q = cycle.reference.joint_q.copy()
-    place_hands(model, joint_q, shift, turn)
-    heights = tuple(float(path[row, 2]) for row in ball.checkpoints)
+    ease = min(EASE, 0.5 * hands.timestep * min(len(way.path) for way in flown))
     by = f"{100 * moved:.0f} cm and {np.degrees(turned):.0f} degrees"
-    note = f"hands led to a ball that can be pushed so, by up to {by}"
-    reference = replace(cycle.reference, joint_q=joint_q)
-    return replace(cycle, reference=reference), replace(ball, path=path, heights=heights), note
+    return Led(
+        [
+            *((np.arange(way.way.release - 1, way.way.catch + 1), way.path) for way in flown),
+            *((one.hold.rows, one.path) for one in carried),
+        ],
+        [(one.hold.hand, *part) for one in carried for part in _eased(one, hands, ease)],
+        f"hands led to a ball that can be pushed so, by up to {by}",
+    )
 
 
-def _let_go_early(ball: Ball, rows: int, count: int) -> Ball:
-    """The same with every flight of the cycle of `count` rows begun so many rows before."""
+def _along(ball: Ball, path: np.ndarray) -> Ball:
+    """The ball on another way."""
+    return replace(ball, path=path, heights=tuple(float(path[row, 2]) for row in ball.checkpoints))
+
+
+def _let_go_early(ball: Ball, rows: int, count: int | None = None) -> Ball:
+    """The same with every flight begun so many rows before. count: rows of a cycle."""
     flights, touch = [], ball.touch.copy()
     for way in ball.flights:
-        release = way.release - rows
-        touch[np.arange(release, way.release) % count, way.hand] = False
-        later = count if release < 0 else 0
-        flights.append(replace(way, release=release + later, catch=way.catch + later))
-    touch[-1] = touch[0]
+        sooner = np.arange(way.release - rows - SHORTEST, way.release)
+        if count is None and (sooner[0] < 0 or not touch[sooner, way.hand].all()):
+            flights.append(way)
+            continue
+        touch[sooner[SHORTEST:] % (count or len(touch)), way.hand] = False
+        later = count if count and way.release < rows else 0
+        flights.append(replace(way, release=way.release - rows + later, catch=way.catch + later))
+    if count:
+        touch[-1] = touch[0]
     return replace(ball, touch=touch, flights=tuple(flights))
 
 
-def place_hands(model: Model, joint_q: np.ndarray, shift: np.ndarray, turn: np.ndarray) -> None:
-    """Solve the arms of joint_q (frames, nq), in place, for hands moved by `shift` (frames, 2, 3) [m],
+def place_hands(model: Model, joint_q: np.ndarray, shift: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """joint_q (frames, nq) with the arms solved for hands moved by `shift` (frames, 2, 3) [m],
     with a ball on each, and turned about that ball by `turn` (frames, 2, 3) [rad]."""
+    joint_q = joint_q.copy()
     for hand, (palm, elbow) in enumerate(zip(model.roles.both("palms"), model.roles.elbows)):
         if not (shift[:, hand].any() or turn[:, hand].any()):
             continue
@@ -110,6 +161,7 @@ def place_hands(model: Model, joint_q: np.ndarray, shift: np.ndarray, turn: np.n
         centre = before[:, :3] + was.apply(arm) + shift[:, hand]
         now = Rotation.from_rotvec(turn[:, hand]) * was
         reach(model, joint_q, elbow, _within_reach(model, joint_q, elbow, centre - now.apply(arm)), now)
+    return joint_q
 
 
 def _within_reach(model: Model, joint_q: np.ndarray, elbow: str, wrist: np.ndarray) -> np.ndarray:

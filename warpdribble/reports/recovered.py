@@ -31,6 +31,7 @@ from ..learning.runs.stage import Context
 from ..learning.tasks.fingers import with_ready_hands
 from ..sims import Model
 from ..sims.ball.ball import BOUNCED, Ball, flights_of, inferred_ball, recorded_ball
+from ..sims.ball.lead import led_once
 from ..sims.retarget.retarget import retargeted
 from ..sims.signals import runs
 from .recorded import Physics, physics
@@ -144,7 +145,8 @@ def recover(model: Model, path: Path, limit: float, share: float, loose: float |
     ball = inferred_ball(model, result.reference, result.scale)
     if ball is None or not ball.checkpoints:
         return Recovered(path.name, "no ball inferred", 0.0, **own)
-    context, began = _context(model, result.reference, ball, share, loose), time.process_time()
+    reference, ball, _ = led_once(model, result.reference, ball) or (result.reference, ball, "")
+    context, began = _context(model, reference, ball, share, loose), time.process_time()
     try:
         learner: Any = stage.make(context)
     except ValueError as error:

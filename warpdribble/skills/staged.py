@@ -20,7 +20,7 @@ from ..sims.ball.ball import (
     recorded_ball,
 )
 from ..sims.ball.hands import find_hands
-from ..sims.ball.lead import led
+from ..sims.ball.lead import led, led_once
 from ..sims.errors import InputError
 from ..sims.model import Model
 from ..sims.reference.mirror import mirrored
@@ -106,6 +106,12 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
         reference = cycle.reference
         if cycle.gap:
             notes.append(f"its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
+    elif ball is not None and not ball.recorded and not skill.authored:
+        once = led_once(model, reference, ball)
+        if once is not None:
+            reference, ball, note = once
+            ball = replace(ball, heights=skill.heights or ball.heights)
+            notes.append(note)
     if ball is not None and not skill.authored:
         joint_q = reference.joint_q.copy()
         joint_q[:, model.q_slice(model.roles.one("ball_joint"))][:, :3] = ball.path

@@ -31,19 +31,18 @@ def pulled(player, cycle, ball, height):
     for way in ball.flights:
         hold = np.arange(way.catch, cycle.reference.frame_count)
         shift[hold, way.next_hand, 2] = height * np.sin(np.pi * (hold - hold[0]) / (hold[-1] - hold[0])) ** 2
-    joint_q = cycle.reference.joint_q.copy()
-    place_hands(player, joint_q, shift, turn)
+    joint_q = place_hands(player, cycle.reference.joint_q, shift, turn)
     return replace(cycle, reference=Reference(joint_q, cycle.reference.timestep))
 
 
 def test_hands_are_put_where_they_are_asked_to_be(player):
     cycle, _ = authored(player, "dribble_right")
-    rng, joint_q = np.random.default_rng(0), cycle.reference.joint_q.copy()
+    rng, joint_q = np.random.default_rng(0), cycle.reference.joint_q
     before = find_hands(player, cycle.reference)
     shift = 0.05 * rng.uniform(-1.0, 1.0, (1, 2, 3)) * np.array([0.0, 1.0])[:, None]
     turn = 0.3 * rng.uniform(-1.0, 1.0, (1, 2, 3)) * np.array([0.0, 1.0])[:, None]
     shift, turn = (np.repeat(v, len(joint_q), axis=0) for v in (shift, turn))
-    place_hands(player, joint_q, shift, turn)
+    joint_q = place_hands(player, joint_q, shift, turn)
     after = find_hands(player, Reference(joint_q, cycle.reference.timestep))
     np.testing.assert_allclose(after.centre - before.centre, shift, atol=1e-6)
     angle = np.arccos(np.sum(after.normal[:, 1] * before.normal[:, 1], axis=1))

@@ -101,7 +101,8 @@ def test_an_inferred_ball_is_said(simulated, tmp_path, mocap):
     skill, others = simulated(skill_file(tmp_path, path, (597, 684), cyclic="true"), "--repeat", 2)
     assert_same_places(places, others)
     assert notes(clip) == notes(skill) and notes(clip)[-1].endswith("degrees per joint apart: blended")
-    assert notes(clip)[-2] == "ball inferred from the hands' motion"
+    assert notes(clip)[-3] == "ball inferred from the hands' motion"
+    assert notes(clip)[-2].startswith("hands led to a ball that can be pushed so, by up to ")
     assert len(places["/World/Ball"]) == 145 and "bounces" in clip
 
 
