@@ -27,6 +27,8 @@ from .possession import Flight
 NEAR, PULL, EVEN = 0.05, 0.07, 0.5
 """What costs the same: [m] off the recorded hand, [g] of a pull, and [g] by which its force, from knot to
 knot, changes more than before."""
+HIT, HARDER = 1.0, 0.1
+"""[g] A hand that meets a flying ball with more force hits it on; how much more costs the same."""
 SOFT = 0.05
 """[g] over which a pull begins to count."""
 KNOTS = 0.05
@@ -71,7 +73,9 @@ class Hold:
     push: np.ndarray
     """... the force [g], without what carries its weight, ..."""
     change: np.ndarray
-    """(k - 1, m) ... and by how much that changes [g]."""
+    """(k - 2, m) ... and by how much, from knot to knot, that changes more than before [g]."""
+    meets: np.ndarray
+    """(r, m) The force [g] at the first two knots after a flight, without what carries its weight."""
 
     @classmethod
     def of(
@@ -92,6 +96,7 @@ class Hold:
         faster = _summed(shape, step)
         one, none = np.ones((len(rows), 1)), np.zeros((len(rows), 2))
         change = np.diff(np.eye(len(knots)), 2, axis=0) / GRAVITY
+        meets = np.eye(0 if comes is None else 2, len(knots)) / GRAVITY
         return cls(
             hand,
             comes,
@@ -105,6 +110,7 @@ class Hold:
             np.hstack([0.0 * one, one, faster]),
             np.hstack([none, shape / GRAVITY]),
             np.hstack([np.zeros((len(change), 2)), change]),
+            np.hstack([np.zeros((len(meets), 2)), meets]),
         )
 
 
@@ -184,7 +190,7 @@ class Carried:
         return axis / np.maximum(sine, 1e-9) * angle * smoothstep(np.clip(size / WEAK, 0.0, 1.0))
 
     def misses(self) -> tuple[np.ndarray, np.ndarray]:
-        """What is least in squares (r,): off the hand, pulled, uneven; and its slopes (r, 3 m) over the
+        """What is least in squares (r,): off the hand, pulled, uneven, hit; and its slopes (r, 3 m) over the
         points."""
         hold, three = self.hold, np.eye(3)
         along = np.sum(self.force * hold.normal, axis=1, keepdims=True)
@@ -193,13 +199,23 @@ class Carried:
         over = aside - FRICTION * along
         root = np.sqrt(over**2 + SOFT**2)
         steep = 0.5 * (1.0 + over / root) * (across / aside - FRICTION * hold.normal)
-        values = [self.shift / NEAR, 0.5 * (over + root) / PULL, hold.change @ self.points / EVEN]
+        met = hold.meets @ self.points + [0.0, 0.0, 1.0]
+        size = np.sqrt(np.sum(met**2, axis=1, keepdims=True) + SOFT**2)
+        harder = np.maximum(size - HIT, 0.0)
+        values = [
+            self.shift / NEAR,
+            0.5 * (over + root) / PULL,
+            hold.change @ self.points / EVEN,
+            harder / HARDER,
+        ]
         slopes = [
             np.kron(hold.way, three) / NEAR,
             (hold.push[:, :, None] * steep[:, None]).reshape(len(steep), -1) / PULL,
             np.kron(hold.change, three) / EVEN,
+            (hold.meets[:, :, None] * ((size > HIT) * met / size)[:, None]).reshape(-1, self.points.size)
+            / HARDER,
         ]
-        share = [1.0 / np.sqrt(len(part)) for part in values]
+        share = [1.0 / np.sqrt(max(len(part), 1)) for part in values]
         return (
             np.concatenate([by * part.ravel() for by, part in zip(share, values)]),
             np.concatenate([by * part for by, part in zip(share, slopes)]),

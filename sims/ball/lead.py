@@ -35,6 +35,8 @@ SMOOTH = 0.03
 """[s] over which a palm's turn is smoothed."""
 BENT, STRETCHED = 0.95, 0.985
 """[-] of its length to which an arm is stretched easily, and at most; the elbow of a straight one snaps."""
+FAR, ASIDE = 0.35, 1.05
+"""[m], [rad] Hands that would have to be led farther hardly have the ball when it is said that they do."""
 SLIGHT, TURNED = 0.02, 0.2
 """[m], [rad] Hands that are so near to where they would be led stay as they are."""
 
@@ -116,13 +118,14 @@ def _lead(hands: Hands, chain: Chain) -> Led | None:
         return None
     ease = min(EASE, 0.5 * hands.timestep * min(len(way.path) for way in flown))
     by = f"{100 * moved:.0f} cm and {np.degrees(turned):.0f} degrees"
+    doubt = ": look whether they have it then" if moved > FAR or turned > ASIDE else ""
     return Led(
         [
             *((np.arange(way.way.release - 1, way.way.catch + 1), way.path) for way in flown),
             *((one.hold.rows, one.path) for one in carried),
         ],
         [(one.hold.hand, *part) for one in carried for part in _eased(one, hands, ease)],
-        f"hands led to a ball that can be pushed so, by up to {by}",
+        f"hands led to a ball that can be pushed so, by up to {by}{doubt}",
     )
 
 
