@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from warpdribble.sims import Model
-from warpdribble.sims.authored.catalogue import authored_clip
-from warpdribble.sims.ball.ball import flights_of
+from warpdribble.sims.authored.catalogue import AUTHORED, authored_clip
+from warpdribble.sims.ball.ball import Ball, ball_path, flights_of
 from warpdribble.sims.ball.flight import BOUNCE, GRAVITY, GRIP
 from warpdribble.sims.ball.hands import find_hands
-from warpdribble.sims.ball.lead import led, place_hands
+from warpdribble.sims.ball.lead import led, led_once, place_hands
 from warpdribble.sims.reference.reference import Cycle, Reference
 from warpdribble.skills import Skill, stage_skill
 
@@ -94,6 +94,28 @@ def test_hands_that_are_right_stay_as_they_are(player):
     if found is not None:
         moved = find_hands(player, found[0].reference).centre - find_hands(player, cycle.reference).centre
         assert np.abs(moved).max() < 0.03
+
+
+@pytest.mark.parametrize("name", sorted(AUTHORED))
+def test_whatever_is_told_of_the_ball_hands_stay_whole(player, name):
+    """Contacts at random, that no hands were moved for."""
+    rng, reference = np.random.default_rng(5), authored_clip(player, name).reference
+    hands, frames = find_hands(player, reference), reference.frame_count
+    for _ in range(2):
+        touch = np.zeros((frames, 2), bool)
+        for hand in (0, 1, 0, 1):
+            first = rng.integers(0, frames)
+            touch[first : first + rng.integers(1, 40), hand] = True
+        flights = flights_of(touch)
+        ball = Ball(ball_path(hands, touch, flights), touch, (), (), flights)
+        once, again = led_once(player, reference, ball), led(player, Cycle.of(player, reference), ball)
+        found = [] if once is None else [(once[0].joint_q, once[1])]
+        found += [] if again is None else [(again[0].reference.joint_q, again[1])]
+        for q, one in found:
+            assert np.isfinite(q).all() and np.isfinite(one.path).all()
+            turns = q[:, player.coordinates.turn_q]
+            np.testing.assert_allclose(np.linalg.norm(turns, axis=-1), 1.0, atol=1e-9)
+            assert np.all(one.touch <= touch)
 
 
 def test_two_hands_that_hold_it_are_left_alone(player):
