@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..model import Model
 from ..planar import rotation
@@ -325,6 +324,8 @@ class Chain:
 
     def solve(self) -> tuple[list[Flown], list[Carried]] | None:
         """The flights and holds that fit together, nearest to the recorded hands; None where none do."""
+        from scipy.optimize import least_squares  # not every skill needs it
+
         fit = least_squares(self.off, self.start, self.slopes, method="lm", ftol=1e-4)
         flown, carried = self.at(fit.x)
         return (flown, carried) if np.abs(self.gaps(flown, carried)).max(initial=0.0) < CLOSED else None

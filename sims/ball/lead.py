@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from ..model import Model, pose
+from ..planar import over_ground
 from ..reference.reference import Cycle, Reference
 from ..retarget.reach import reach
 from ..signals import smoothstep
@@ -37,6 +38,8 @@ BENT, STRETCHED = 0.95, 0.985
 """[-] of its length to which an arm is stretched easily, and at most; the elbow of a straight one snaps."""
 FAR, ASIDE = 0.35, 1.05
 """[m], [rad] Hands that would have to be led farther hardly have the ball when it is said that they do."""
+HERE = np.zeros(2)
+"""What vectors are turned about."""
 SLIGHT, TURNED = 0.02, 0.2
 """[m], [rad] Hands that are so near to where they would be led stay as they are."""
 
@@ -61,11 +64,13 @@ def led(
             now = rows // count == cycles
             path[rows[now] % count] = _back(model, cycle, places[now], int(cycles))
     for hand, rows, *vectors in found.hands:
-        for out, own in zip((shift, turn), vectors):
-            np.add.at(out[:, hand], rows % count, _turned(own, -cycle.turn * (rows // count)))
+        for cycles in np.unique(rows // count):
+            now = rows // count == cycles
+            for out, own in zip((shift, turn), vectors):
+                out[rows[now] % count, hand] += over_ground(own[now], HERE, HERE, -cycle.turn * cycles)
     path[-1] = cycle.ahead(model, path[:1])[0]
     for out in (shift, turn):
-        out[-1] = _turned(out[0], np.full(2, cycle.turn))
+        out[-1] = over_ground(out[0], HERE, HERE, cycle.turn)
     joint_q = place_hands(model, cycle.reference.joint_q, shift, turn)
     reference = replace(cycle.reference, joint_q=joint_q)
     return replace(cycle, reference=reference), _along(ball, path), found.note
@@ -88,7 +93,7 @@ def led_once(
     for hand, rows, *vectors in found.hands:
         inside = (rows >= 0) & (rows < frames)
         for out, own in zip((shift, turn), vectors):
-            np.add.at(out[:, hand], rows[inside], own[inside])
+            out[rows[inside], hand] += own[inside]
     joint_q = place_hands(model, reference.joint_q, shift, turn)
     return replace(reference, joint_q=joint_q), _along(ball, path), found.note
 
@@ -198,8 +203,3 @@ def _back(model: Model, cycle: Cycle, points: np.ndarray, cycles: int) -> np.nda
     for _ in range(abs(cycles)):
         points = cycle.behind(model, points) if cycles > 0 else cycle.ahead(model, points)
     return points
-
-
-def _turned(vectors: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) turned about the vertical by angles (n,) [rad]."""
-    return Rotation.from_euler("z", np.asarray(angles, float)[:, None]).apply(vectors)

@@ -98,21 +98,21 @@ def stage_skill(model: Model, skill: Skill, data: str | Path | None = None) -> S
             cycle = closed(model, reference)
         if ball is not None and not skill.authored:
             ball = _closed_ball(model, ball, cycle)
-            found = None if ball.recorded else led(model, cycle, ball)
-            if found is not None:
+            if not ball.recorded and (found := led(model, cycle, ball)) is not None:
                 cycle, ball, note = found
-                ball = replace(ball, heights=skill.heights or ball.heights)
                 notes.append(note)
         reference = cycle.reference
         if cycle.gap:
             notes.append(f"its ends are {57.3 * cycle.gap:.1f} degrees per joint apart: blended")
-    elif ball is not None and not ball.recorded and not skill.authored:
-        once = led_once(model, reference, ball)
-        if once is not None:
-            reference, ball, note = once
-            ball = replace(ball, heights=skill.heights or ball.heights)
-            notes.append(note)
+    elif (
+        ball is not None
+        and not (ball.recorded or skill.authored)
+        and (once := led_once(model, reference, ball)) is not None
+    ):
+        reference, ball, note = once
+        notes.append(note)
     if ball is not None and not skill.authored:
+        ball = replace(ball, heights=skill.heights or ball.heights)
         joint_q = reference.joint_q.copy()
         joint_q[:, model.q_slice(model.roles.one("ball_joint"))][:, :3] = ball.path
         reference = replace(reference, joint_q=joint_q)
